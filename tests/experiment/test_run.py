@@ -316,12 +316,26 @@ def test_a_polite_kill_stops_the_rig():
         ({"y": [0.0]}, r"channel 'y' of rig 'pitch' has shape \(1,\) for a block of 2 commands"),
         ({"y": ["a", "b"]}, "channel 'y' of rig 'pitch' is not numeric"),
         ({}, "delivered no usable record: channel 'y' has 0 samples"),
-        (np.full(2, np.nan), "delivered no usable record: channel 'y' holds nan at sample 0"),
+        (np.full(2, np.nan), "delivered no usable record: channel 'y' holds 0 numbers in"),
     ],
 )
 def test_what_a_rig_may_not_return(returns, words):
     with pytest.raises(RigError, match=words):
         run(Spy(returns=returns), SINE)
+
+
+def test_a_sample_that_is_no_number_is_a_gap_as_in_a_file():
+    class Faulty(Spy):
+        def play(self, block):
+            read = super().play(block).copy()
+            read[block.time == 1.0] = np.nan
+            return read
+
+    record = run(Faulty(), SINE)
+    assert record.outputs[0].values.size == SINE.samples - 1
+    assert 1.0 not in record.outputs[0].time
+    (missing,) = (f for f in record.findings if f.code == "missing_samples")
+    assert "1 of 200 samples of 'y' are missing" in missing.message
 
 
 def test_a_rig_that_moves_and_states_no_limits_is_refused():
@@ -485,7 +499,11 @@ def nothing(block):
             Watch(),
             r"measured position 3\.\d+ deg of y .* by more",
         ),
-        (lambda b: b.position[:, 0] + np.nan, Watch(), "measured position nan deg of y"),
+        (
+            lambda b: b.position[:, 0] + np.nan,
+            Watch(),
+            r"measured position of y at 0\.000 s is nan, so that nobody knows where the axis is",
+        ),
         (
             lambda b: 0.7 * b.position[:, 0],
             Watch(following_error=0.5),

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import RecordError, RigError
-from hmpim.record import Channel, Record, Stopping
+from hmpim.record import Channel, Record, Role, Series, Stopping
+from hmpim.record.mend import mend
 from hmpim.rigs import Block, ChannelSpec, Commands, Layout, Reply, RunReport, Samples
 
 __all__ = ["Collected", "Played", "default_layout"]
@@ -119,6 +120,8 @@ class Collected:
     ) -> Record:
         """Return all that was collected, its stamps put right as the rig's report says.
 
+        What a reader mends in a file is mended here: a sample that is no number is a gap, and said.
+
         Raises
         ------
         RigError
@@ -126,23 +129,29 @@ class Collected:
         """
         said = RunReport() if report is None else report
 
-        def channel(spec: ChannelSpec) -> Channel:
+        def series(spec: ChannelSpec) -> Series:
             whole = Samples.joined(self._parts[spec.name] or [_EMPTY])
             retime = said.clocks.get(spec.clock)
             time = whole.time if retime is None else retime(whole.time)
-            return Channel(name=spec.name, time=time, values=whole.values, unit=spec.unit)
+            return Series(name=spec.name, time=time, values=whole.values, unit=spec.unit)
 
         try:
+            mended = mend([series(spec) for spec in self._layout.channels])
+            made = dict(zip(self._specs, mended.channels, strict=True))
+
+            def channels(role: Role) -> tuple[Channel, ...]:
+                return tuple(made[spec.name] for spec in self._layout.of(role))
+
             return Record(
-                inputs=tuple(channel(spec) for spec in self._layout.of("input")),
-                outputs=tuple(channel(spec) for spec in self._layout.of("output")),
+                inputs=channels("input"),
+                outputs=channels("output"),
                 fs=fs,
                 band=band,
                 intersample=self._layout.intersample,
                 source=self._layout.source,
-                references=tuple(channel(spec) for spec in self._layout.of("reference")),
-                auxiliary=tuple(channel(spec) for spec in self._layout.of("auxiliary")),
-                findings=said.findings,
+                references=channels("reference"),
+                auxiliary=channels("auxiliary"),
+                findings=(*said.findings, *mended.findings),
                 stopping=self.stopping,
             )
         except RecordError as error:

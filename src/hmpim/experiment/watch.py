@@ -106,6 +106,11 @@ class Watcher:
         factor = conversion_factor(spec.unit, to=own)
         k = int(np.argmax(np.abs(samples.values)))
         found = factor * float(samples.values[k])
+        if not math.isfinite(found):
+            raise RigError(
+                f"measured {spec.quantity} of {spec.name} at {samples.time[k]:.3f} s is {found}, "
+                f"so that nobody knows where the axis is; {self._name!r} is stopped"
+            )
         if not abs(found) <= bound * (1.0 + self._watch.margin):
             raise RigError(
                 f"measured {spec.quantity} {found:.6g} {own} of {spec.name} at "
