@@ -1,13 +1,25 @@
 """A rig over an unkind network: what is found is the rig's, and what went wrong is said."""
 
+import itertools
+
 import numpy as np
 import pytest
 
-from hmpim.errors import LimitsError, RigError, UnitError
+from hmpim.errors import ArgumentError, LimitsError, RigError, UnitError
 from hmpim.experiment import RunLog, RunOptions, run
 from hmpim.identify import identify
 from hmpim.rigs import ManualClock, Rig
-from hmpim.rigs.wire import FarEnd, Hello, State, WireRig, expected_hello
+from hmpim.rigs.wire import (
+    Datagram,
+    FarEnd,
+    Hello,
+    Kind,
+    State,
+    WireRig,
+    expected_hello,
+    pack,
+    unpack,
+)
 from hmpim.stimulus import Limits, Stimulus, design
 from wire_support import LIMITS, Lag, Network, hello
 
@@ -80,7 +92,7 @@ def test_lost_late_doubled_and_swapped_are_counted_and_put_right():
     said = {f.code: f.message for f in record.findings}
     assert "commands came too late or not at all" in said["datagrams"]
     assert "were lost on the way back, and are gaps" in said["datagrams"]
-    assert "came out of order and were put in their place" in said["datagrams"]
+    assert "samples put back in order: " in said["datagrams"]
     assert "datagrams" not in {f.code for f in clean.findings}
     counts = network.farend.counts
     assert counts.lost > 10
@@ -248,3 +260,104 @@ def test_ctrl_c_brakes_the_far_end_before_the_run_is_left():
     network.receive(0.1)
     assert network.farend.state is State.IDLE
     assert network.orders[-1].velocity.tolist() == [0.0, 0.0]
+
+
+def number_of(data):
+    """Kind and number of a datagram."""
+    return unpack(data).kind, unpack(data).number
+
+
+class Mangling(Network):
+    """Exchanges each datagram for what a function of the way and the datagram makes of it."""
+
+    def __init__(self, clock, mangle, **kwargs):
+        super().__init__(clock, **kwargs)
+        self.mangle = mangle
+
+    def _carry(self, way, data):
+        mangled = self.mangle(way, data)
+        if mangled is not None:
+            super()._carry(way, mangled)
+
+
+def mangled_run(mangle, **kwargs):
+    clock = ManualClock()
+    network = Mangling(clock, mangle, **kwargs)
+    rig = WireRig(transport=network, clock=clock)
+    return run(rig, SWEEP, options=RunOptions(clock=clock)), network
+
+
+def test_a_run_whose_last_commands_are_lost_has_ended_and_is_kept():
+    def last_two_lost(way, data):
+        kind, number = number_of(data)
+        return None if (kind, number >= SWEEP.samples - 2) == (Kind.COMMAND, True) else data
+
+    record, _ = mangled_run(last_two_lost)
+    said = {f.code: f.message for f in record.findings}
+    assert "last 2 of" in said["cut_short"]
+    assert record.samples >= SWEEP.samples - 2
+
+
+def test_a_far_end_that_comes_to_rest_in_mid_run_is_noticed_at_once():
+    """At rest in the lead, it stands without ever having braked."""
+    still = design(
+        band=(0.2, 20), duration=3, fs=500, axis="roll", lead=1.0,
+        limits=Limits(position=5, velocity=150, acceleration=3500, unit="deg"),
+    )  # fmt: skip
+    clock = ManualClock()
+
+    def stopping(way, data):
+        if way == 0 and number_of(data) == (Kind.COMMAND, 9):
+            network.farend.receive(stop_of(data), now=0)
+        return data
+
+    def stop_of(data):  # as from a button beside the table
+        return pack(Datagram(kind=Kind.STOP, session=unpack(data).session))
+
+    network = Mangling(clock, stopping)
+    with pytest.raises(RigError, match="'bench' stopped by itself: no reason given"):
+        run(WireRig(transport=network, clock=clock), still, options=RunOptions(clock=clock))
+    assert len(network.states) / 500.0 < 0.5
+
+
+def test_a_reason_that_is_lost_is_not_waited_for_for_ever():
+    clock = ManualClock()
+
+    def silent(way, data):
+        return None if way == 1 and number_of(data)[0] is Kind.REFUSED else data
+
+    network = Mangling(clock, silent)
+
+    class Tripping(Lag):
+        def advance(self, order):
+            assert clock.now() < 20.0, "still waiting"
+            if clock.now() > 2.0:
+                network.farend.trip("oil pressure low")
+            return super().advance(order)
+
+    network.plant = Tripping(2, 500.0)
+    with pytest.raises(RigError, match="'bench' stopped by itself: no reason given"):
+        run(WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock))
+
+
+def test_garbage_ends_a_run_but_does_not_keep_it_from_being_stopped():
+    clock = ManualClock()
+
+    def garbled(way, data):
+        return b"garbage" if way == 1 and clock.now() > 2.0 and next(some) % 4 else data
+
+    some = itertools.count()
+    log = RunLog()
+    network = Mangling(clock, garbled)
+    with pytest.raises(RigError, match="7 bytes that are no datagram of hmpim"):
+        run(
+            WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock), log=log
+        )
+    assert "stop" in [event.kind for event in log.events]
+    assert network.states[-1] in (State.AT_REST, State.BRAKING)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, np.nan, np.inf, "x", True])
+def test_a_time_that_is_none_is_refused(seconds):
+    with pytest.raises(ArgumentError, match=r"answer = .* s must be a positive, finite time"):
+        WireRig(transport=Network(ManualClock()), answer=seconds)

@@ -194,8 +194,7 @@ def _datagrams(counts: Counts, reckoned: int, dropped: int, sent: int) -> Findin
         )
     if counts.swapped or counts.doubled:
         words.append(
-            f"{counts.swapped} came out of order and were put in their place, and "
-            f"{counts.doubled} came twice"
+            f"samples put back in order: {counts.swapped}; samples repeated: {counts.doubled}"
         )
     return Finding(code="datagrams", message="; ".join(words) + ".", severity="info", parameters=())
 
