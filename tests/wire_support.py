@@ -79,7 +79,7 @@ class Network:
         self.plugged = True
         self.orders = []
         self.states = []
-        self.name = "simulated"
+        self.name, self.doubt = "simulated", "is it on?"
         self.ticks = itertools.count()
         self.begun = clock.now() + phase * self.period
         self._push(self.begun, "tick", None)

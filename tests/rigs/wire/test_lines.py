@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from hmpim.errors import RigError
+from hmpim.errors import ArgumentError, RigError
 from hmpim.experiment import run
 from hmpim.identify import identify
 from hmpim.rigs import SystemClock
@@ -95,6 +95,46 @@ def test_what_is_not_there_is_said():
             ).rig,
             SWEEP,
         )
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        (b"", r"is it on, and are the port and the baud rate \(9600\) right\?"),
+        (b"noise" * 20, r"100 bytes came, and no datagram: is the baud rate \(9600\) right\?"),
+    ],
+)
+def test_a_line_at_the_wrong_rate_is_told_from_one_that_is_silent(written, words):
+    pytest.importorskip("serial")
+    master, end = os.openpty()
+    try:
+        options = {"baud": 9600, "answer": 0.3}
+        rig = find_rig(f"serial:{os.ttyname(end)}", description=describe({"options": options})).rig
+
+        def talk(over):
+            while not over.wait(0.1):
+                if written and not sent:
+                    sent.append(os.write(master, written))
+
+        sent = []
+        with meanwhile(talk), pytest.raises(RigError, match=words):
+            run(rig, SWEEP)
+    finally:
+        os.close(master)
+        os.close(end)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "words"),
+    [
+        ("serial:x", {"baud": "fast"}, "baud = 'fast' is not a whole number"),
+        ("can:x", {"bitrate": 1.5}, "bitrate = 1.5 is not a whole number"),
+        ("can:x", {"interface": 3}, "interface = 3 is not a text"),
+    ],
+)
+def test_options_of_a_line_of_the_wrong_type_are_refused(kind, options, words):
+    with pytest.raises(ArgumentError, match=words):
+        find_rig(kind, description=describe({"options": options}))
 
 
 def test_wait_for_a_datagram_is_not_rounded_to_milliseconds():

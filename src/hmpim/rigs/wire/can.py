@@ -3,6 +3,7 @@
 import time
 from typing import Any
 
+from hmpim.arguments import check_argument
 from hmpim.errors import MissingExtraError, RigError
 from hmpim.rigs.wire.framing import Reassembly, can_frames
 from hmpim.rigs.wire.transport import OneOtherEnd
@@ -36,6 +37,8 @@ class CanClient:
         there: int = _THERE,
         back: int = _BACK,
     ) -> None:
+        check_argument("interface", interface, str)
+        check_argument("bitrate", bitrate, int)
         self._channel, self._interface, self._bitrate = channel, interface, bitrate
         self._there, self._back = there, back
         self._bus: Any = None
@@ -45,6 +48,11 @@ class CanClient:
     def name(self) -> str:
         """Channel of the bus."""
         return f"can:{self._channel}"
+
+    @property
+    def doubt(self) -> str:
+        """That nobody is there, or listens at another rate."""
+        return f"is it on, and are the channel and the bitrate ({self._bitrate}) right?"
 
     def open(self) -> None:
         """Open the bus; frames of others are not looked at.

@@ -295,8 +295,8 @@ class WireRig:
                     check_agreement(self._expected, self._stated)
                     return
         raise RigError(
-            f"{self._transport.name} does not answer within {self._answer:g} s; is it on, and is "
-            "the address right?"
+            f"{self._transport.name} does not answer within {self._answer:g} s; "
+            f"{self._transport.doubt}"
         )
 
     def _arm(self) -> None:

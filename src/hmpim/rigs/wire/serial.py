@@ -4,6 +4,7 @@ import time
 from collections import deque
 from typing import Any
 
+from hmpim.arguments import check_argument
 from hmpim.errors import MissingExtraError, RigError
 from hmpim.rigs.wire.framing import Deframer, serial_frame
 from hmpim.rigs.wire.transport import OneOtherEnd
@@ -45,9 +46,11 @@ class SerialClient:
     """
 
     def __init__(self, port: str, *, baud: int = 921_600) -> None:
+        check_argument("baud", baud, int)
         self._port, self._baud = port, baud
         self._line: Any = None
         self._found: deque[bytes] = deque()
+        self._came = 0
         self._deframer = Deframer()
 
     @property
@@ -55,11 +58,21 @@ class SerialClient:
         """Port of the computer."""
         return f"serial:{self._port}"
 
+    @property
+    def doubt(self) -> str:
+        """That nobody is there, or speaks at another rate: then bytes come, and no datagram."""
+        if self._came:
+            return (
+                f"{self._came} bytes came, and no datagram: is the baud rate ({self._baud}) right?"
+            )
+        return f"is it on, and are the port and the baud rate ({self._baud}) right?"
+
     def open(self) -> None:
         """Open the port, and forget what came before."""
         self._line = open_line(self._port, self._baud)
         self._line.reset_input_buffer()
         self._found.clear()
+        self._came = 0
         self._deframer = Deframer()
 
     def close(self) -> None:
@@ -103,6 +116,7 @@ class SerialClient:
                 data = self._line.read(max(1, self._line.in_waiting))
             except OSError as error:
                 raise RigError(f"{self.name} is gone: {error}") from error
+            self._came += len(data)
             self._found.extend(self._deframer.take(data))
             if not self._found and left <= 0.0:
                 return None

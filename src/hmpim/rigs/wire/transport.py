@@ -21,6 +21,11 @@ class Transport(Protocol):
         """Where the other end is, for messages."""
         ...
 
+    @property
+    def doubt(self) -> str:
+        """What may be wrong if nothing is heard, as a question."""
+        ...
+
     def open(self) -> None:
         """Connect."""
         ...
@@ -144,6 +149,11 @@ class UdpClient:
     def name(self) -> str:
         """Address of the far end."""
         return f"udp://{self._address[0]}:{self._address[1]}"
+
+    @property
+    def doubt(self) -> str:
+        """That nobody is there."""
+        return "is it on, and is the address right?"
 
     def open(self) -> None:
         """Make a socket that hears the far end alone."""
