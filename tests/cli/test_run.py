@@ -94,7 +94,7 @@ def test_a_stimulus_beyond_the_stated_limits_is_refused(folder):
     out = run("run", "--rig-file", "rig.toml", "s.csv", "-o", "r.csv", "--log", "run.log")
     assert out.exit_code == 2
     assert "peak position 9.99962 deg is beyond the limit 9 deg of 'sensor'" in out.stderr
-    assert "fault  LimitsError: peak position 9.99962 deg" in (folder / "run.log").read_text()
+    assert "fault  peak position 9.99962 deg" in (folder / "run.log").read_text()
 
 
 def test_rigs_are_listed_and_the_broken_named(folder):
@@ -171,8 +171,11 @@ def test_ctrl_c_says_what_there_is_of_the_run(folder, monkeypatch):
     monkeypatch.setattr("hmpim.cli.run._watching", lambda live: [enough])
     out = run("run", "--rig", "eye", "s.csv", "-o", "r.h5")
     assert out.exit_code == 130
-    assert "what was recorded until then is in r.h5" in out.stderr
+    assert "stopped by Ctrl-C; what was recorded until then is in r.h5" in out.stderr
     assert not read_recording(folder / "r.h5").complete
+    out = run("run", "--rig", "eye", "s.csv", "--json", "r.json")
+    assert out.exit_code == 130
+    assert "stopped by Ctrl-C; nothing was kept" in out.stderr
 
 
 @pytest.mark.parametrize(

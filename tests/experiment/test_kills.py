@@ -89,7 +89,7 @@ def check(table, folder, kind, at, nursery=None):
         assert code == -signal.SIGKILL
     elif kind == "interrupt":
         assert code == 130
-        assert "ended early (KeyboardInterrupt)" in str(kept.record.findings)
+        assert "ended early (Ctrl-C)" in str(kept.record.findings)
         assert "table was told to stop" in (folder / "run.log").read_text()
     elif kind == "exception":
         assert code == 1

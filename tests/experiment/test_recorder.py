@@ -1,14 +1,18 @@
 """What a run keeps on the disk: all of it, as it comes, whatever ends the run."""
 
 import errno
+import os
 import shutil
+import signal
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hmpim.errors import ArgumentError, RecordError
+from hmpim.errors import ArgumentError, RecordError, RigError
 from hmpim.experiment import RunLog, run
+from hmpim.experiment.interrupt import AskedToEnd
+from hmpim.experiment.recorder import Recorder
 from hmpim.formats import load
 from hmpim.formats.recording import read_recording, writer
 from hmpim.identify import identify
@@ -82,7 +86,8 @@ def test_whatever_ends_the_run_keeps_what_there_was_and_it_is_identified(tmp_pat
     kept = read_recording(tmp_path / "r.h5")
     assert not kept.complete
     (said,) = [f for f in kept.record.findings if f.code == "incomplete"]
-    assert f"ended early ({type(fault).__name__}" in said.message
+    name = "Ctrl-C" if isinstance(fault, KeyboardInterrupt) else type(fault).__name__
+    assert f"ended early ({name}" in said.message
     whole = run(SENSOR, SWEEP, rng=1)
     assert kept.record.samples == 600
     assert np.array_equal(kept.record.outputs[0].values, whole.outputs[0].values[:600])
@@ -92,6 +97,41 @@ def test_whatever_ends_the_run_keeps_what_there_was_and_it_is_identified(tmp_pat
     for name, truth in (("delay", 0.05), ("natural_frequency", 8.0), ("damping_ratio", 0.5)):
         found = getattr(pair.parameters, name)
         assert abs(found.value - truth) < 4 * found.std
+
+
+@pytest.mark.parametrize("fault", [OSError("cable"), KeyboardInterrupt(), AskedToEnd(15)])
+def test_a_file_that_does_not_grow_keeps_what_there_was_too(tmp_path, fault):
+    log = RunLog()
+    with pytest.raises(BaseException):  # noqa: B017, PT011 - each kind in turn
+        run(Failing(fault), SWEEP, path=tmp_path / "r.csv", rng=1, log=log)
+    record = load(tmp_path / "r.csv")
+    whole = run(SENSOR, SWEEP, rng=1)
+    assert np.array_equal(record.outputs[0].values, whole.outputs[0].values[:600])
+    (said,) = [f for f in record.findings if f.code == "incomplete"]
+    why = {OSError: "OSError: cable", KeyboardInterrupt: "Ctrl-C", AskedToEnd: "SIGTERM"}
+    assert why[type(fault)] in said.message
+    assert log.events[-1].message == f"what was recorded until then is in {tmp_path / 'r.csv'}"
+
+
+def test_a_file_that_does_not_grow_is_left_alone_where_nothing_was_recorded(tmp_path):
+    (tmp_path / "r.csv").write_text("of yesterday")
+    with pytest.raises(RigError):
+        run(Failing(OSError("cable"), after=0.0), SWEEP, path=tmp_path / "r.csv", rng=1)
+    assert (tmp_path / "r.csv").read_text() == "of yesterday"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals to oneself")
+def test_a_second_ctrl_c_does_not_hide_what_was_kept(tmp_path, monkeypatch):
+    log, fail = RunLog(), Recorder.fail
+
+    def interrupted(self, reason):
+        os.kill(os.getpid(), signal.SIGINT)
+        return fail(self, reason)
+
+    monkeypatch.setattr(Recorder, "fail", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(Failing(KeyboardInterrupt()), SWEEP, path=tmp_path / "r.h5", rng=1, log=log)
+    assert [event.kind for event in log.events][-2:] == ["stop", "kept"]
 
 
 def test_another_process_reads_all_but_the_last_quarter_second_while_it_runs(tmp_path):

@@ -249,9 +249,9 @@ def _kept_is_said(log: "RunLog") -> Iterator[None]:
 
     try:
         yield
-    except (KeyboardInterrupt, AskedToEnd):
-        for message in _kept(log):
-            warn(message)
+    except (KeyboardInterrupt, AskedToEnd) as ended:
+        cause = "Ctrl-C" if isinstance(ended, KeyboardInterrupt) else str(ended)
+        warn("; ".join((f"stopped by {cause}", *(_kept(log) or ["nothing was kept"]))))
         raise
     except SystemExit as error:
         message = f"the rig called sys.exit({error.code!r}); make it return, or raise an error"

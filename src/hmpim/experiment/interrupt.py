@@ -18,6 +18,10 @@ class AskedToEnd(SystemExit):
 
     def __init__(self, number: int) -> None:
         super().__init__(128 + number)
+        self._signal = signal.Signals(number).name
+
+    def __str__(self) -> str:
+        return self._signal
 
 
 def _in_main_thread() -> bool:

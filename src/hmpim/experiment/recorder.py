@@ -6,12 +6,13 @@ from os import PathLike
 from pathlib import Path
 
 from hmpim.errors import HmpimError
+from hmpim.experiment.collect import Collected
 from hmpim.experiment.log import Event, RunLog
 from hmpim.formats.atomic import check_writable
 from hmpim.formats.recording import RecordWriter, save_recording
 from hmpim.formats.saving import save
-from hmpim.record import Record
-from hmpim.rigs import Commands, Layout, LimitsOfAxes, Samples
+from hmpim.record import Finding, Record
+from hmpim.rigs import Commands, Layout, LimitsOfAxes, RunReport, Samples
 from hmpim.stimulus import Stimulus
 
 __all__ = ["Recorder"]
@@ -28,7 +29,7 @@ class Recorder:
     ----------
     path : path-like or None
         File to write; one that ends in .h5 grows as samples come, any other is written at the
-        end. None keeps nothing.
+        end, or when the run fails. None keeps nothing.
     rig : str
         On what it is played.
     limits : Limits, or mapping of axis to Limits, or None
@@ -60,6 +61,8 @@ class Recorder:
         self._rig, self._limits, self._stimuli = rig, limits, tuple(stimuli)
         self._commands, self._log = commands, log
         self._writer: RecordWriter | None = None
+        self._collected: Collected | None = None
+        self._band: tuple[float, float] | None = None
         self._waiting: dict[str, list[Samples]] = {}
         self._next = 0.0
         if self._path is not None:
@@ -71,8 +74,11 @@ class Recorder:
         """Whether samples go to the disk as they come."""
         return self._path is not None and self._path.suffix.lower() in _GROWING
 
-    def open(self, layout: Layout, *, band: tuple[float, float] | None) -> None:
-        """Lay out the file, before anything moves."""
+    def open(
+        self, layout: Layout, collected: Collected, *, band: tuple[float, float] | None
+    ) -> None:
+        """Lay out the file, before anything moves; one that does not grow takes `collected`."""
+        self._collected, self._band = collected, band
         if self._path is None or not self.grows:
             return
         self._writer = RecordWriter(
@@ -123,7 +129,7 @@ class Recorder:
         """Keep what there is, marked incomplete; say whether there is anything."""
         self._log.follow(None)
         if self._writer is None:
-            return False
+            return self._saved_so_far(reason)
         writer, self._writer = self._writer, None
         with contextlib.suppress(HmpimError):  # a full disk: what was written before is kept
             self._flush_to(writer)
@@ -131,6 +137,26 @@ class Recorder:
         with contextlib.suppress(HmpimError):  # the file stays as it grew, and can be read
             writer.close(ended=reason or "the run failed")
         return kept
+
+    def _saved_so_far(self, reason: str) -> bool:
+        """Save what was collected to a file that did not grow."""
+        if self._path is None or self._collected is None:
+            return False
+        early = Finding(
+            code="incomplete",
+            message=f"The run ended early ({reason or 'it failed'}).",
+            severity="info",
+            parameters=(),
+        )
+        report = RunReport(findings=(early,))
+        try:
+            save(
+                self._collected.record(fs=self._commands.fs, band=self._band, report=report),
+                self._path,
+            )
+        except HmpimError:  # too little for a record, or a full disk
+            return False
+        return True
 
     def _flush(self) -> None:
         if self._writer is not None:

@@ -15,7 +15,7 @@ from hmpim.experiment.checks import (
 )
 from hmpim.experiment.collect import Collected, Played, default_layout
 from hmpim.experiment.feel import Feel, feel
-from hmpim.experiment.interrupt import undisturbed
+from hmpim.experiment.interrupt import AskedToEnd, undisturbed
 from hmpim.experiment.log import RunLog
 from hmpim.experiment.options import RunOptions
 from hmpim.experiment.pacer import Pacer
@@ -154,9 +154,8 @@ class Running:
             record = self._played(ready, findings, recorder)
         except BaseException as error:
             with undisturbed():
-                kept = recorder.fail(_words(error))
-            if kept:
-                self.log.add("kept", f"what was recorded until then is in {self.path}")
+                if recorder.fail(_words(error)):
+                    self.log.add("kept", f"what was recorded until then is in {self.path}")
             raise
         recorder.finish(record)
         return record
@@ -194,9 +193,9 @@ class Running:
         layout = self.rig.prepare(only if isinstance(self.given, Stimulus) else ready.stimuli)
         if layout is None:
             layout = default_layout(commands, name=self.rig.name)
-        recorder.open(layout, band=shared_band(ready.stimuli))
-        self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
         collected = Collected(layout, name=self.rig.name)
+        recorder.open(layout, collected, band=shared_band(ready.stimuli))
+        self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
         watcher = Watcher(
             self.options.watch, ready.limits, name=self.rig.name, real=moves(self.rig)
         )
@@ -284,7 +283,7 @@ class Running:
         try:
             self._stop()
         except Exception as error:
-            why = str(cause) if isinstance(cause, HmpimError) else _words(cause)
+            why = _words(cause)
             more = "" if str(error) in why else f": {_words(error)}"
             raise RigError(
                 f"rig {self.rig.name!r} failed: {why}; then it could not be told to stop{more}"
@@ -319,8 +318,10 @@ class _Playing:
 
 
 def _words(error: BaseException) -> str:
-    """What failed, by its own name."""
-    if isinstance(error, _WatcherError):
+    """What failed: in its own words, or by its name where those are not ours."""
+    if isinstance(error, KeyboardInterrupt):
+        return "Ctrl-C"
+    if isinstance(error, _WatcherError | AskedToEnd | HmpimError):
         return str(error)
     return f"{type(error).__name__}: {error}".rstrip(": ")
 
