@@ -63,8 +63,9 @@ def test_a_linear_rig_is_moved_in_steps_to_all_of_it():
     record, said = felt(rig)
     assert np.allclose(np.array(rig.peaks) / SWEEP.peaks.position, [0.05, 0.2, 0.5, 1.0])
     assert rig.stops == 4
-    assert (
-        said.message == "The rig was moved at 5 %, 20 %, 50 % of the amplitude first, and bore it."
+    assert said.message == (
+        "The rig was first moved at 5 %, 20 %, 50 % of the amplitude; it stayed linear and inside "
+        "its limits."
     )
     assert np.array_equal(record.inputs[0].values, SWEEP.position)
 
@@ -83,19 +84,21 @@ def test_a_resonance_is_kept_inside_the_limit_on_what_is_measured():
 def test_what_ends_to_be_linear_is_pushed_no_further():
     rig = Arm(lambda y: np.clip(y, -0.35, 0.35))  # clips between 5 % and 20 %
     record, said = felt(rig, limits=WIDE)
-    assert "beyond proportion" in said.message
+    assert "departs from proportion by" in said.message
     assert np.abs(record.inputs[0].values).max() == pytest.approx(0.25, rel=1e-3)
 
 
 def test_noise_that_hides_the_smallest_motion_is_no_departure():
     rig = Arm(lambda y: 0.5 * y, noise_std=0.3)
     _, said = felt(rig, limits=WIDE)
-    assert said.message.endswith("and bore it.")
+    assert said.message.endswith("inside its limits.")
 
 
 def test_a_rig_that_does_not_answer_is_not_pushed():
     rig = Arm(lambda y: 0 * y)
-    with pytest.raises(RigError, match="moved a little, nothing of y changed; is it switched on"):
+    with pytest.raises(
+        RigError, match="y did not change when the rig was moved a little; is it swi"
+    ):
         felt(rig)
     assert len(rig.peaks) == 1
 

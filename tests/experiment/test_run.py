@@ -382,7 +382,7 @@ def test_several_axes_by_name_or_by_their_own():
     assert np.all(by_name.channel("yaw.position").values[100:] == slow.motion(np.ones(1)).position)
     with pytest.raises(ArgumentError, match="axis 'nod' is not known; use one of"):
         run(Spy(axes=axes), {"nod": slow})
-    with pytest.raises(ArgumentError, match=r"axes \['yaw', 'yaw'\] are not told apart"):
+    with pytest.raises(ArgumentError, match=r"axes \['yaw', 'yaw'\] must be different names"):
         run(Spy(axes=axes), [slow, slow])
     with pytest.raises(ArgumentError, match="'pitch' takes one stimulus, and 2 are given"):
         run(Spy(), [slow, fast])

@@ -104,4 +104,4 @@ def test_the_log_says_how_the_run_was_scheduled_and_timed():
     played(np.zeros(1), log=log)
     notes = [event.message for event in log.events if event.kind == "note"]
     assert "scheduling" in notes[0]
-    assert notes[1].startswith("Commands went within 0 ms of their time")
+    assert notes[1].startswith("Commands were sent within 0 ms of their due time")

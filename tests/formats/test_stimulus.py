@@ -89,8 +89,8 @@ def sine(axis, fs=10.0):
     [
         ([], "there is no stimulus"),
         ([sine("a"), sine("b", fs=20.0)], "sampled at 10 Hz and 20 Hz"),
-        ([sine("a"), sine("a")], r"axes \['a', 'a'\] are not told apart"),
-        ([sine("a"), sine("")], "are not told apart"),
+        ([sine("a"), sine("a")], r"axes \['a', 'a'\] must be different names"),
+        ([sine("a"), sine("")], "must be different names"),
         ([sine("a,b"), sine("c")], "axis 'a,b' cannot head a column"),
     ],
 )

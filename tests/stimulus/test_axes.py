@@ -138,8 +138,8 @@ def test_the_same_stimulus_on_two_axes_is_refused_by_name():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: design_axes([], duration=10, fs=FS), "are not told apart"),
-        (lambda: design_axes(plans(("a", "a")), duration=10, fs=FS), "are not told apart"),
+        (lambda: design_axes([], duration=10, fs=FS), "must be different names"),
+        (lambda: design_axes(plans(("a", "a")), duration=10, fs=FS), "must be different names"),
         (lambda: design_axes(plans(), duration=0.4, fs=FS), "leaves no time to move"),
         (lambda: design_axes(plans(), duration=10, fs=FS, method="luck"), "method = 'luck'"),
         (lambda: AxisPlan(axis="", limits=LIMITS, band=(1, 2)), "names no axis"),

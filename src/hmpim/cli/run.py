@@ -183,7 +183,7 @@ def run(
             f"{stopped.saved:.3g} s saved"
         )
     elif rule is not None:
-        say(f"Played to its end: not sure before ({rule})")
+        say(f"Played to its end: the rule was not met before ({rule})")
     if output is not None:
         say(f"Record: {output}")
     if json is None and report is None:

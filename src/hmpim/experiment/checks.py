@@ -88,8 +88,8 @@ def check_watched(rig: Rig, *, needed: bool, log: RunLog) -> None:
     what = f"{rig.name!r} has no watchdog: if this process is killed, nothing stops it"
     if needed:
         raise RigError(
-            f"{what}; give its far end one and state it (watchdog = 0.1), or say --no-watchdog, "
-            "and it is driven by a process of its own that lives on to stop it"
+            f"{what}; give its far end one and state it (watchdog = 0.1), or use --no-watchdog: a "
+            "separate process then drives it, and stops it if this one is killed"
         )
     log.add("note", what)
 

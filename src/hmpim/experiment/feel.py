@@ -1,4 +1,4 @@
-"""Feel before you push: an unknown rig is moved a little first, and more as it bears it.
+"""Feel before you push: an unknown rig is moved a little first, then more, step by step.
 
 The stimulus is played at a small share of its amplitude, then at a larger one, and so on. Each
 time what came back says what the next share would bring: measured positions grow with the
@@ -79,7 +79,7 @@ def feel(
     *,
     how: Feel,
 ) -> Felt:
-    """Find the share of a stimulus's amplitude that a rig bears, in steps from a small one.
+    """Find the share of a stimulus's amplitude that a rig can be given, in steps from a small one.
 
     Parameters
     ----------
@@ -121,8 +121,8 @@ def feel(
             if departed > how.departure:
                 return _less(
                     before[0],
-                    f"from {100 * before[0]:.3g} to {100 * share:.3g} % of the amplitude the "
-                    f"response changed by {100 * departed:.3g} % of itself beyond proportion",
+                    f"between {100 * before[0]:.3g} and {100 * share:.3g} % of the amplitude the "
+                    f"response departs from proportion by {100 * departed:.3g} %",
                 )
         before = (share, record)
     words = ", ".join(f"{100 * share:.3g} %" for share in how.shares)
@@ -131,7 +131,10 @@ def feel(
         findings=(
             Finding(
                 code="felt",
-                message=f"The rig was moved at {words} of the amplitude first, and bore it.",
+                message=(
+                    f"The rig was first moved at {words} of the amplitude; it stayed linear and "
+                    "inside its limits."
+                ),
                 severity="info",
                 parameters=(),
             ),
@@ -181,7 +184,8 @@ def _answers(record: Record) -> None:
             return
     names = ", ".join(channel.name for channel in record.outputs)
     raise RigError(
-        f"moved a little, nothing of {names} changed; is it switched on, and are these its sensors?"
+        f"{names} did not change when the rig was moved a little; is it switched on, and are these "
+        "its sensors?"
     )
 
 

@@ -1,7 +1,7 @@
 """Four questions before a run: limits, error bars, independence, and the rig's answer.
 
-A run that answers yes to all of them is safe, and will tell what is asked. The first three move
-nothing; the last moves the rig at a small share of the amplitude.
+If all are answered with yes, the run is safe and its record will give what is asked for. The
+first three move nothing; the last moves the rig at a small share of the amplitude.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -116,7 +116,7 @@ def error_light(
     >>> model = RoughModel(delay=0.15, natural_frequency=10, damping_ratio=0.4)
     >>> light = error_light([stimulus], model=model, noise_std=0.1, wanted=0.1)
     >>> light.green, light.words
-    (True, 'natural frequency ± 0.00629 Hz (95 %), at most 0.1 Hz wanted')
+    (True, 'natural frequency ± 0.00629 Hz (95 %), wanted: at most 0.1 Hz')
     """
     try:
         found = [
@@ -130,7 +130,7 @@ def error_light(
     return Light(
         name="error bars",
         green=worst <= wanted,
-        words=f"natural frequency ± {worst:.3g} Hz (95 %){where}, at most {wanted:.3g} Hz wanted",
+        words=f"natural frequency ± {worst:.3g} Hz (95 %){where}, wanted: at most {wanted:.3g} Hz",
     )
 
 
@@ -162,7 +162,8 @@ def independence_light(stimuli: Sequence[Stimulus]) -> Light:
     return Light(
         name="independence",
         green=found.share >= _MOST,
-        words=f"{100 * found.share:.0f} % of {band[0]:g} to {band[1]:g} Hz tells the axes apart",
+        words=f"the axes can be told apart in {100 * found.share:.0f} % of the band from "
+        f"{band[0]:g} to {band[1]:g} Hz",
     )
 
 

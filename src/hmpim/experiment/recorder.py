@@ -33,7 +33,7 @@ class Recorder:
     rig : str
         On what it is played.
     limits : Limits, or mapping of axis to Limits, or None
-        What the rig bears.
+        Limits of the rig.
     stimuli : sequence of Stimulus
         What is played.
     commands : Commands

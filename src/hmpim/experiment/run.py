@@ -124,5 +124,7 @@ def _mapped(
         )
     axes = [s.axis for s in stimulus]
     if len(set(axes)) < len(axes) or (len(axes) > 1 and not all(axes)):
-        raise ArgumentError(f"axes {axes!r} are not told apart; give each stimulus its own axis")
+        raise ArgumentError(
+            f"axes {axes!r} must be different names; give each stimulus its own axis"
+        )
     return stimulus[0] if len(stimulus) == 1 else {s.axis: s for s in stimulus}

@@ -139,8 +139,8 @@ class Sure:
         self._stimulus = next(iter(stimuli.values()))
         if self._stimulus.band is None:
             raise ArgumentError(
-                "the stimulus has no band, so that nobody knows when it has passed it; take one "
-                "that has, design(kind='repeated') for instance"
+                "the stimulus has no band, so it is not known when the whole band was covered; "
+                "use one that has a band, such as design(kind='repeated')"
             )
         self._pair = Paired((source.name, output.name), fs=self._stimulus.fs)
         mode = layout.intersample if source.role == "input" else None  # a measured one is smooth

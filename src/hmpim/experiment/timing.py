@@ -64,13 +64,13 @@ class Timing:
         Examples
         --------
         >>> print(measure_timing(np.arange(5) / 8, fs=8.0).words())
-        Commands went within 0 ms of their time (median; 99.9 %: 0 ms; worst: 0 ms), 100 % of ...
+        Commands were sent within 0 ms of their due time (median; 99.9 %: 0 ms; worst: 0 ms), ...
         """
         return (
-            f"Commands went within {_time(self.median)} of their time (median; 99.9 %: "
+            f"Commands were sent within {_time(self.median)} of their due time (median; 99.9 %: "
             f"{_time(self.most)}; worst: {_time(self.worst)}), "
-            f"{100 * self.within_half:.4g} % of the periods were right to half a period, and "
-            f"{self.missed} of {self.commands} commands were a period or more late."
+            f"{100 * self.within_half:.4g} % of the periods were right to within half a period, "
+            f"and {self.missed} of {self.commands} commands were a period or more late."
         )
 
 
@@ -147,10 +147,10 @@ def judge_timing(
         Finding(
             code="timing",
             message=(
-                f"{timing.words()} That is too irregular for {highest:g} Hz: it alone may be "
-                f"wrong by {_in_percent(share)} there, and {100 * TOO_IRREGULAR:g} % is borne; run "
-                "on a quieter computer, with real-time scheduling, or with a rig that stamps its "
-                "own samples."
+                f"{timing.words()} That is too irregular for {highest:g} Hz: the jitter alone may "
+                f"cause an error of {_in_percent(share)} there, and at most "
+                f"{100 * TOO_IRREGULAR:g} % is acceptable. Run on a quieter computer, with "
+                "real-time scheduling, or with a rig that stamps its own samples."
             ),
             severity="doubt",
             parameters=("delay", "noise_std"),

@@ -109,7 +109,7 @@ class Watcher:
         if not math.isfinite(found):
             raise RigError(
                 f"measured {spec.quantity} of {spec.name} at {samples.time[k]:.3f} s is {found}, "
-                f"so that nobody knows where the axis is; {self._name!r} is stopped"
+                f"so the position of its axis is unknown; {self._name!r} is stopped"
             )
         if not abs(found) <= bound * (1.0 + self._watch.margin):
             raise RigError(

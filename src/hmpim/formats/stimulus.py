@@ -217,7 +217,9 @@ def check_together(stimuli: Stimulus | Sequence[Stimulus]) -> tuple[Stimulus, ..
         )
     axes = [s.axis for s in stimuli]
     if len(stimuli) > 1 and (len(set(axes)) < len(axes) or not all(axes)):
-        raise ArgumentError(f"axes {axes!r} are not told apart; give each stimulus its own axis")
+        raise ArgumentError(
+            f"axes {axes!r} must be different names; give each stimulus its own axis"
+        )
     for axis in axes:
         if any(c in axis for c in ',"#\n\r'):
             raise ArgumentError(

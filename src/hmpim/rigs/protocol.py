@@ -54,7 +54,7 @@ class Rig(Protocol):
 
     @property
     def limits(self) -> LimitsOfAxes:
-        """What the unit bears. Checked before anything moves; None is refused if it moves."""
+        """Limits of the unit. Checked before anything moves; None is refused if it moves."""
         ...
 
     def __enter__(self) -> Self:

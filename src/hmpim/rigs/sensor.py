@@ -76,7 +76,7 @@ class Sensor(Simulated):
     name, input_name, output_name : str
         Name of the rig, and of its record's channels.
     limits : Limits or None
-        What the unit bears; None for anything.
+        Limits of the unit; None for no limits.
 
     Raises
     ------

@@ -148,7 +148,7 @@ def design_axes(
     """
     names = [plan.axis for plan in plans]
     if not plans or len(set(names)) < len(names):
-        raise ArgumentError(f"axes {names!r} are not told apart; give each plan its own axis")
+        raise ArgumentError(f"axes {names!r} must be different names; give each plan its own axis")
     total = check_positive("duration", duration, "s")
     size_of(total, check_positive("fs", fs, "Hz"))
     if not 0.0 <= tail < math.inf:

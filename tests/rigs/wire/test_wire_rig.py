@@ -1,6 +1,8 @@
 """A rig over an unkind network: what is found is the rig's, and what went wrong is said."""
 
 import itertools
+import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,6 +170,21 @@ def test_what_the_ends_do_not_agree_about_is_refused(expected, words):
         play(expected=expected)
 
 
+@pytest.mark.parametrize("left_out", ["axes", "units", "rate"])
+def test_a_far_end_that_leaves_out_what_it_must_state_is_refused(left_out):
+    def forgetful(way, data):
+        datagram = unpack(data)
+        if datagram.kind is not Kind.WELCOME:
+            return data
+        said = json.loads(datagram.text)
+        said[left_out] = None if left_out == "rate" else []
+        said["units"] = said["units"] if said["axes"] else []
+        return pack(replace(datagram, text=json.dumps(said)))
+
+    with pytest.raises(RigError, match="the far end must state its axes, a unit for each, and its"):
+        mangled_run(forgetful)
+
+
 def test_what_is_narrower_than_the_rigs_limits_is_a_wish():
     limits = Limits(position=10, unit="deg")
     expected = expected_hello(axes=("roll",), unit="deg", rate=500.0, limits=limits)
@@ -209,14 +226,16 @@ def test_a_pulled_cable_is_noticed_and_the_far_end_comes_to_rest(way):
         network.delays = (cable, cable)
     words = {
         "there": "stopped by itself: no command came",
-        "back": "was told to stop and does not say that it stands, 2 s later; its watchdog brakes",
+        "back": "was told to stop and did not confirm within 2 s that it stands still; its",
     }
     with pytest.raises(RigError, match=words[way]):
         run(
             WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock), log=log
         )
     faults = [event.message for event in log.events if event.kind == "fault"]
-    assert "stopped by itself: no command came" in faults[0] or "nothing was heard" in faults[0]
+    assert (
+        "stopped by itself: no command came" in faults[0] or "nothing was heard from" in faults[0]
+    )
     network.receive(1.0)
     position = np.array([order.position[0] for order in network.orders])
     assert np.abs(position).max() <= LIMITS["roll"].position
@@ -294,7 +313,7 @@ def test_a_run_whose_last_commands_are_lost_has_ended_and_is_kept():
 
     record, _ = mangled_run(last_two_lost)
     said = {f.code: f.message for f in record.findings}
-    assert "last 2 of" in said["cut_short"]
+    assert "the samples of the last 2 never came" in said["cut_short"]
     assert record.samples >= SWEEP.samples - 2
 
 

@@ -55,7 +55,7 @@ class Heading(ByValue):
     rig : str
         On what.
     limits : mapping of str to Limits
-        What the rig bears, by axis; the axis is '' where it has one only.
+        Limits of the rig, by axis; the axis is '' where it has one only.
     stopping : Stopping or None
         That the run was ended because it was sure.
     created, version : str

@@ -43,7 +43,7 @@ class Recording(ByValue):
     rig : str
         On what; empty where that is not known.
     limits : mapping of str to Limits
-        What the rig bears, by axis; the axis is '' where it has one only.
+        Limits of the rig, by axis; the axis is '' where it has one only.
     log : tuple of str
         What happened, line by line.
     complete : bool
@@ -85,7 +85,7 @@ def save_recording(
     rig : str
         On what.
     limits : Limits, or mapping of axis to Limits, or None
-        What the rig bears.
+        Limits of the rig.
     log : sequence of str
         What happened, line by line.
 

@@ -83,7 +83,7 @@ class RecordWriter:
     rig : str
         On what.
     limits : Limits, or mapping of axis to Limits, or None
-        What the rig bears.
+        Limits of the rig.
 
     Raises
     ------

@@ -145,10 +145,10 @@ class Arrivals:
         offset = fit.offset - fit.drift * fit.origin  # at the start of the run
         known = self._on_the_way is not None and math.isfinite(self._on_the_way)
         way = (
-            f"Its samples take at least {1e3 * (self._on_the_way or 0.0):.3g} ms to us, as stated."
+            f"Its samples arrive after {1e3 * (self._on_the_way or 0.0):.3g} ms or more, as stated."
             if known
-            else "The shortest time that its samples take to us is not known and cannot be told "
-            "from stamps that come one way: it counts to the unit's delay; state it if you know it."
+            else "The shortest time in which its samples arrive cannot be measured from stamps "
+            "that come one way, so it counts as part of the unit's delay; state it if you know it."
         )
         return Finding(
             code="clocks",

@@ -226,12 +226,12 @@ def findings_of(counts: dict[str, int]) -> tuple[Finding, ...]:
     Examples
     --------
     >>> findings_of({"frames": 10, "dropped": 2, "repeated": 0, "lost": 0})[0].message
-    '2 of 10 frames were dropped: the answer before stood for them.'
+    '2 of 10 frames were dropped; the previous answer was held.'
     """
     words = {
-        "dropped": "dropped: the answer before stood for them",
-        "repeated": "repeated: the tracker saw the frame before once more",
-        "lost": "without a target that the tracker could find: its answer before stood for them",
+        "dropped": "dropped; the previous answer was held",
+        "repeated": "repeated; the tracker saw the previous frame again",
+        "lost": "lost to the tracker; it did not find the target, and its previous answer was held",
     }
     return tuple(
         Finding(

@@ -184,8 +184,8 @@ def _datagrams(counts: Counts, reckoned: int, dropped: int, sent: int) -> Findin
     words = []
     if reckoned:
         words.append(
-            f"{reckoned} of {sent} commands came too late or not at all, and the rig went on as "
-            "it was going; the input recorded is what was in force"
+            f"{reckoned} of {sent} commands came too late or not at all, and the rig extrapolated "
+            "from the last; the input recorded is what was in force"
         )
     if counts.lost or dropped:
         words.append(
@@ -202,7 +202,7 @@ def _datagrams(counts: Counts, reckoned: int, dropped: int, sent: int) -> Findin
 def _cut_short(missing: int, sent: int) -> Finding:
     return Finding(
         code="cut_short",
-        message=f"The samples of the last {missing} of {sent} commands never came back.",
+        message=f"Of {sent} commands, the samples of the last {missing} never came back.",
         severity="info",
         parameters=(),
     )
@@ -212,9 +212,9 @@ def _lag(seconds: float, name: str) -> Finding:
     return Finding(
         code="lag",
         message=(
-            f"{name!r} fell behind its own clock by up to {1e3 * seconds:.3g} ms; its samples are "
-            "stamped with the time they stand for, but a real unit beside it would not wait: give "
-            "it a quieter computer."
+            f"{name!r} fell behind its own clock by up to {1e3 * seconds:.3g} ms. Its samples are "
+            "stamped with the time they stand for, but a real unit beside it would not wait: run "
+            "it on a quieter computer."
         ),
         severity="info",
         parameters=(),
@@ -226,10 +226,10 @@ def _clocks(fit: ClockFit, name: str) -> Finding:
         code="clocks",
         message=(
             f"The clock of {name!r} is {fit.offset:+.6f} s from ours and gains "
-            f"{1e6 * fit.drift:+.2f} ppm; both are taken out. Which way of the network is the "
-            f"slower cannot be told, so that the offset may be wrong by "
-            f"±{1e3 * fit.uncertainty:.3g} ms. Input and output are stamped by that one clock, "
-            "so that no delay found between them contains the network's."
+            f"{1e6 * fit.drift:+.2f} ppm; both are taken out. Which direction of the network is "
+            "slower cannot be measured, so the offset may be wrong by "
+            f"±{1e3 * fit.uncertainty:.3g} ms. Input and output are both stamped by that clock, so "
+            "the delay between them does not contain the network's."
         ),
         severity="info",
         parameters=(),

@@ -108,6 +108,8 @@ class Hello:
                     "update the older one"
                 )
             axes, units = tuple(data["axes"]), tuple(data["units"])
+            if not all(isinstance(axis, str) and axis for axis in axes):
+                raise RigError(f"the hello names axes {axes!r}; give each a name")
             if units and len(units) != len(axes):
                 raise RigError(f"the hello states {len(axes)} axes and {len(units)} units")
             for unit in units:
@@ -155,6 +157,7 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
     ------
     RigError
         If axes, units, rate or limits differ, or units cannot be compared; the message says both.
+        If the far end leaves one of the first three out.
 
     Examples
     --------
@@ -164,6 +167,11 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
     hmpim.errors.RigError: 'table' says that roll is in 'deg', and 'rad' is expected; ...
     """
     who = repr(stated.name)
+    if not stated.axes or len(stated.units) != len(stated.axes) or stated.rate is None:
+        raise RigError(
+            f"{who} states axes {stated.axes}, units {stated.units} and rate {stated.rate}; the "
+            "far end must state its axes, a unit for each, and its rate"
+        )
     if expected.rate is not None and not _same(expected.rate, stated.rate):
         raise RigError(
             f"{who} runs at {stated.rate:g} Hz, and {expected.rate:g} Hz is expected; design the "

@@ -209,11 +209,11 @@ class WireRig:
         braking = (
             f"its watchdog brakes it after {watchdog:g} s of silence"
             if watchdog
-            else "it has no watchdog: go and look"
+            else "it has no watchdog, so stop it by hand"
         )
         raise RigError(
-            f"{self.name!r} at {self._transport.name} was told to stop and does not say that it "
-            f"stands, {self._answer:g} s later; {braking}"
+            f"{self.name!r} at {self._transport.name} was told to stop and did not confirm within "
+            f"{self._answer:g} s that it stands still; {braking}"
         )
 
     def report(self) -> RunReport:
@@ -343,8 +343,7 @@ class WireRig:
         silent = self._clock.now() - self._heard
         if silent > self._stale:
             raise RigError(
-                f"nothing was heard of {self.name!r} for {silent:.3g} s; the run is given up, and "
-                "its watchdog has to stop it"
+                f"nothing was heard from {self.name!r} for {silent:.3g} s, so the run was ended"
             )
 
     def _drain(self, account: Account, *, last: int, period: float) -> None:
