@@ -378,3 +378,10 @@ def test_sizes_seeds_and_numbers():
         numbers_of("u", [0.0, math.nan])
     with pytest.raises(RecordError, match="is complex"):
         hmpim.Channel(name="u", time=[0, 1], values=[1j, 2])
+
+
+def test_a_table_of_numbers_is_not_told_that_they_are_not_real():
+    with pytest.raises(
+        ArgumentError, match=r"y = an array of shape \(3, 2\) is not one row of num"
+    ):
+        numbers_of("y", np.zeros((3, 2)))

@@ -295,8 +295,10 @@ def numbers_of(name: str, values: ArrayLike) -> NDArray[np.float64]:
         real = array.dtype.kind in "iuf" and not np.ma.is_masked(values)
     except ValueError:  # rows of unequal lengths
         real = False
-    if not real or array.ndim > 1:
+    if not real:
         raise ArgumentError(f"{name} = {shown(values)} is not made of real numbers")
+    if array.ndim > 1:
+        raise ArgumentError(f"{name} = {shown(values)} is not one row of numbers; give shape (n,)")
     bad = np.flatnonzero(~np.isfinite(array))
     if bad.size:
         value = np.atleast_1d(array)[bad[0]]

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from hmpim.cli.gentlest import _as_dict, _print, gentlest
 from hmpim.errors import ArgumentError
+from hmpim.formats.stimulus_files import read_stimuli
 from hmpim.optimal import Accuracy, Errors, Gentlest, ModelRange, RoughModel, Wish
 from hmpim.stimulus import Limits, Sine, Stimulus
 
@@ -57,6 +58,15 @@ def test_what_cannot_be_met_is_said_with_exit_code_1(tmp_path):
     assert not (tmp_path / "s.csv").exists()
 
 
+def test_to_a_specification_that_a_run_reads(tmp_path):
+    rough = ("--natural-frequency", "10", "--damping", "0.4", "--noise", "0.1", "--fs", "200")
+    path = tmp_path / "s.toml"
+    out = run(*rough, "--duration", "2", "--family", "sweep", "-o", str(path))
+    assert out.exit_code == 0, out.output
+    (stimulus,) = read_stimuli(path)
+    assert stimulus.duration == pytest.approx(2.0, abs=0.01)
+
+
 def test_without_any_limit():
     rough = ("--natural-frequency", "10", "--damping", "0.4", "--noise", "0.1", "--fs", "200")
     out = run(*rough, "--duration", "2", "--family", "sweep")
@@ -75,6 +85,7 @@ def test_without_any_limit():
         (("--family", "banjo"), "--family 'banjo' is not known"),
         (("--amplitude", "nan"), "position limit = nan deg"),
         (("--plot", "t.gif"), "does not end in .png"),
+        (("-o", "s.foo"), "--output s.foo must end in one of .csv, "),
         (("--fs", "20"), "is not seen at fs = 20 Hz"),
     ],
 )

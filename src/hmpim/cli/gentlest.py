@@ -83,7 +83,10 @@ def gentlest(
         typer.Option(help="sweep, exponential or multisine; may be repeated; all by default."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="CSV of the samples.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Samples as .csv, .h5, .mat or .h; specification as .toml."
+        ),
     ] = None,
     json_file: Annotated[
         Path | None,
@@ -105,13 +108,15 @@ def gentlest(
     --fs 200 --amplitude 10 --unit deg -o s.csv --json s.json --plot trade.png
     """
     from hmpim.formats.atomic import replacing, write_text
-    from hmpim.formats.stimulus import save_stimulus_csv
+    from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, save_stimulus
     from hmpim.optimal import FAMILIES, Accuracy, ModelRange, RoughModel
     from hmpim.optimal import gentlest as find_gentlest
     from hmpim.optimal import trade as trade_of
     from hmpim.stimulus import Limits
 
     check_files(writes={"--output": output, "--json": json_file, "--plot": plot})
+    if output is not None and output.suffix.lower() not in STIMULUS_SUFFIXES:
+        raise ArgumentError(f"--output {output} must end in one of {', '.join(STIMULUS_SUFFIXES)}")
     if plot is not None and plot.suffix.lower() != ".png":
         raise ArgumentError(f"--plot {plot} does not end in .png, the one picture made here")
     limits = Limits(
@@ -131,7 +136,7 @@ def gentlest(
     for name in family or FAMILIES:
         known = next((f for f in FAMILIES if f == name), None)
         if known is None:
-            raise ArgumentError(f"--family {name!r} is not known; use one of {list(FAMILIES)}")
+            raise ArgumentError(f"--family {name!r} is not known; use one of {', '.join(FAMILIES)}")
         families.append(known)
     points: tuple[TradePoint, ...] = ()
     try:
@@ -166,7 +171,7 @@ def gentlest(
         with replacing(plot) as place:
             trade_plot(found, points).savefig(place, dpi=150)
     if output is not None:
-        save_stimulus_csv(found.stimulus, output)
+        save_stimulus(found.stimulus, output)
     if json_file is not None:
         text = json.dumps(_as_dict(found, points), indent=1, allow_nan=False)
         write_text(json_file, text + "\n")
