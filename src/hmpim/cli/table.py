@@ -101,6 +101,7 @@ def table(
         hello, plant = _sensor(sensor, rate=rate, watchdog=watchdog, seed=seed)
         what = f"Sensor {hello.name!r} at udp://{{}}:{{}}, {rate:g} Hz"
     farend = FarEnd(hello)
+    clock = SkewedClock(SystemClock(), offset=clock_offset, drift=1e-6 * clock_drift)
     host, port = parse_address(udp)
     ended: list[int] = []
 
@@ -112,7 +113,6 @@ def table(
             signal.signal(number, end)
         at = server.address
         say(f"{what.format(at[0], at[1])}; Ctrl-C ends it")
-        clock = SkewedClock(SystemClock(), offset=clock_offset, drift=1e-6 * clock_drift)
         every = max(1, round(0.1 * rate))
         writing = None if trace is None else Trace(trace, hello.axes, every=every)
         with undelayed(realtime=True) as scheduling, writing or nullcontext():
@@ -152,6 +152,16 @@ def _sensor(path: Path, *, rate: float, watchdog: float, seed: int | None) -> "t
             f"--sensor {str(path)!r} describes {found.description.rig!r}, and a sensor is needed: "
             'rig = "sensor"'
         )
-    limits = found.limits if isinstance(found.limits, Limits) else Limits()
+    stated = found.description.rate
+    if stated is not None and stated != rate:
+        raise ArgumentError(
+            f"--rate {rate:g} Hz, and {str(path)!r} states rate = {stated:g}; make them agree"
+        )
+    if found.limits is not None and not isinstance(found.limits, Limits):
+        raise ArgumentError(
+            f"{str(path)!r} states limits of {', '.join(found.limits)}; a sensor is served on one "
+            "axis, so state them under [limits]"
+        )
+    limits = Limits() if found.limits is None else found.limits
     hello = sensor_hello(found.rig, rate=rate, watchdog=watchdog, limits=limits)
     return hello, SensorPlant(found.rig, rate=rate, rng=np.random.default_rng(seed))

@@ -1,10 +1,13 @@
 """Clocks: the computer's own, one turned by hand in tests, and one that goes wrong on purpose."""
 
+import math
 import time
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hmpim.errors import ArgumentError
 
 __all__ = ["Clock", "ManualClock", "SkewedClock", "SystemClock"]
 
@@ -91,7 +94,12 @@ class SkewedClock:
     offset : float
         What it is ahead by, s.
     drift : float
-        Seconds that it gains in a second.
+        Seconds that it gains in a second; more than -1, as no clock runs backwards.
+
+    Raises
+    ------
+    ArgumentError
+        If offset or drift is no finite number, or the clock would stand still or run backwards.
 
     Examples
     --------
@@ -103,6 +111,9 @@ class SkewedClock:
     """
 
     def __init__(self, clock: Clock, *, offset: float = 0.0, drift: float = 0.0) -> None:
+        for name, value, least in (("offset", offset, -math.inf), ("drift", drift, -1.0)):
+            if not (math.isfinite(value) and value > least):
+                raise ArgumentError(f"clock {name} = {value:g} must be finite and above {least:g}")
         self._clock = clock
         self._offset = offset
         self._rate = 1.0 + drift
