@@ -502,7 +502,7 @@ def nothing(block):
         (
             lambda b: b.position[:, 0] + np.nan,
             Watch(),
-            r"measured position of y at 0\.000 s is nan, so that nobody knows where the axis is",
+            r"measured position of y at 0\.000 s is nan, so the position of its axis is unknown",
         ),
         (
             lambda b: 0.7 * b.position[:, 0],

@@ -94,7 +94,7 @@ def test_commands_and_samples_are_stamped_when_they_went():
 def test_a_run_that_is_far_too_late_is_said_in_figures_that_can_be_read():
     timing = measure_timing(np.arange(1000) / FS + np.linspace(0.0, 4.0, 1000), fs=FS)
     (finding,) = judge_timing(timing, band=(0.2, 60.0), stamped=False)
-    assert "wrong by 100 % and more there" in finding.message
+    assert "cause an error of 100 % and more there" in finding.message
     assert "worst: 2 s" in finding.message
     assert "e+" not in finding.message
 
