@@ -182,6 +182,7 @@ def test_silence_at_rest_is_no_fault():
         (command(17.0, 199.0), "stopping distance 21.95.* commanded of roll is beyond 20 deg"),
         (command(8.0), "step of the position .* commanded of roll is beyond 1.264 deg"),
         (command(np.nan), "position nan commanded of roll is beyond"),
+        (command(0.5, 1e200), r"velocity 1e\+200 commanded of roll is beyond"),
     ],
 )
 def test_a_command_beyond_a_limit_is_not_followed(wrong, words):

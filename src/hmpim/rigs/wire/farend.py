@@ -306,9 +306,9 @@ class FarEnd:
         )
 
     def _reach(self, order: Order) -> FloatArray:
-        return np.asarray(
-            np.abs(order.position) + np.square(order.velocity) / (2.0 * self._limit.acceleration)
-        )
+        with np.errstate(over="ignore"):  # of a damaged command: infinite is beyond every limit
+            way = np.square(order.velocity) / (2.0 * self._limit.acceleration)
+        return np.asarray(np.abs(order.position) + way)
 
     def _must_brake(self, order: Order) -> bool:
         """Whether one more tick like this would leave no smooth stop inside the limits."""
