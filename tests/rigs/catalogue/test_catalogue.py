@@ -126,6 +126,7 @@ def test_a_rig_file_and_a_name_may_not_contradict(tmp_path):
         ("process:cat", {"load": "bracket"}, "load = 'bracket' means nothing to a program"),
         ("process:cat", {"options": {"name": 3}}, "name = 3 is not a text"),
         ("seeker", {"load": "ton"}, "load 'ton' is not known"),
+        ("python:f.py:smooth:smple", {}, "ends in 'smple', which is not known; after the function"),
         ("seeker", {"options": {"name": 3}}, "name = 3 is not a text"),
     ],
 )

@@ -38,6 +38,12 @@ def build_python(argument: str, description: Description) -> FunctionRig:
     file = ":".join(parts)
     if not file or not name:
         raise FormatError(f"python:{argument} names no function; write python:FILE:FUNCTION")
+    spoken = file.rpartition(":")[0]
+    if spoken.endswith(".py"):
+        raise FormatError(
+            f"python:{argument} ends in {name!r}, which is not known; after the function write "
+            f"{' or '.join(_MODES)}"
+        )
     known = _options(FunctionRig) - {"function", "reset"}
     options = take_options(description, known, kind="Python function", instead=_ELSEWHERE)
     function = load_code(file, name)
