@@ -33,6 +33,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
@@ -162,8 +163,12 @@ def _fit_and_look_for_rows(
         return fitted
     if several and question.intersample == "sampled":
         return fitted
-    leading = fitted.leading
-    joint, beside, humming = fitted.fits[leading], fitted, None
+    if several and any(f.related and f.best.fit.structure.name not in PLAIN for f in fitted.fits):
+        plainly = _plain_beside_drift(question, seen)
+        if plainly is not None:
+            return plainly
+    asked = fitted.suspect()
+    joint, beside, humming = fitted.fits[asked], fitted, None
     hum = np.zeros(0)
 
     def with_rows(rows: Real, plainly: bool) -> JointFit:
@@ -171,7 +176,7 @@ def _fit_and_look_for_rows(
         names = question.plain if plainly else question.structures
         every = rows if humming is None else np.vstack([rows, humming.rows])
         beside = _fit_once(question, seen, names, every)
-        found = beside.fits[leading]
+        found = beside.fits[asked]
         if humming is None:
             return found
         quiet = without_rows(found, slice(len(rows), None))
@@ -193,10 +198,29 @@ def _fit_and_look_for_rows(
     joint, drifting = with_drift(joint, with_rows, steadily)
     if drifting is not None and humming is not None:
         humming = replace(humming, trend=hum)
-    kept = replace(kept if drifting is None else beside, drifting=drifting, humming=humming)
+    kept = kept if drifting is None else beside
+    kept = replace(kept, drifting=drifting, humming=humming, asked=asked)
     if several:
         return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
     return replace(kept, fits=(joint,), steady=None if drifting is None else fitted.prediction)
+
+
+def _plain_beside_drift(question: Question, seen: Imperfections) -> OutputFit | None:
+    """Plain dynamics of several inputs and a drift, where they leave white noise."""
+    plain = _fit_once(question, seen, question.plain)
+    asked = plain.suspect()
+
+    def with_rows(rows: Real) -> JointFit:
+        nonlocal plain
+        plain = _fit_once(question, seen, question.plain, rows)
+        return plain.fits[asked]
+
+    first = plain.fits[asked]
+    drifting = with_plain_drift(first.problem, first.best.fit, with_rows)
+    if drifting is None:
+        return None
+    fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
+    return replace(plain, fits=fits, drifting=drifting, asked=asked)
 
 
 @kept

@@ -19,9 +19,9 @@ _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not see a direction."""
 
 
-def common(valid: Mask | None, fits: Iterable[JointFit]) -> Mask | None:
-    """Samples that count, shape (n,), and do for all of some fits; None where all do."""
-    told = [mask for mask in (valid, *(fit.problem.valid for fit in fits)) if mask is not None]
+def common(masks: Iterable[Mask | None]) -> Mask | None:
+    """Samples that count for all, shape (n,); None where all do."""
+    told = [mask for mask in masks if mask is not None]
     counted = np.logical_and.reduce(told) if told else np.ones(1, dtype=bool)
     return None if counted.all() else np.asarray(counted)
 
@@ -31,7 +31,12 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
 
     What is not asked for, drift and the states that the inputs begin with, is projected out of all.
     """
-    problem = replace(fits[-1].problem, valid=common(None, fits), whitening=whitening, begins=None)
+    problem = replace(
+        fits[-1].problem,
+        valid=common(f.problem.valid for f in fits),
+        whitening=whitening,
+        begins=None,
+    )
     ones, blocks, others = np.ones((1, problem.y.size)), [], []
     for fit in fits:
         own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
+from hmpim.identify.coupling.joint_errors import covariances, derivatives, own_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
@@ -52,8 +52,9 @@ class OutputFit:
     strong: tuple[bool, ...] = (True,)
     # delay and lag of couplings of no more than first order
     lags: tuple[Lag | None, ...] = (None,)
-    # the bias's drift, of an output to one input; the fit's output is without it
+    # the bias's drift; each fit's output is without it
     drifting: Drifting | None = None
+    asked: int = 0  # the input beside which it was weighed
     humming: Humming | None = None  # its hum, likewise
     steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
     # what is known of a gain that changes, of an output to one input
@@ -69,9 +70,12 @@ class OutputFit:
                 total = total + contribution(fit)
         return total if self.disturbance is None else total + self.disturbance
 
-    @property
-    def leading(self) -> int:
-        """The input that moves the output most."""
+    def suspect(self) -> int:
+        """The input whose fit may have taken a drift for its own; else that which moves most."""
+        for i, fit in enumerate(self.fits):
+            slow = spans_record(fit.best.fit) or fit.lingers
+            if fit.related and self.strong[i] and slow:
+                return i
         parts = [float(np.std(contribution(fit))) if fit.related else -1.0 for fit in self.fits]
         return int(np.argmax(parts))
 
@@ -170,7 +174,7 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
     """Fit, in place, each strong input to what all others leave over."""
     for i in pairs.strong:
         rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
-        pairs.fits[i] = fitted(inputs[i], rest, valid=counted)
+        pairs.put(i, fitted(inputs[i], rest, valid=counted))
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
@@ -179,7 +183,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
     waiting = [j for j in range(len(inputs)) if j not in pairs.strong]
     while waiting:
         left = {j: pairs.without_others(j) for j in waiting}
-        counted = common(pairs.valid, [fits[j] for j in pairs.strong])
+        counted = pairs.counted(pairs.strong)
         constant = constant_of(fits[pairs.strong[0]]) if pairs.strong else 0.0
         rest = {j: one - constant for j, one in left.items()}
         if counted is not None:
@@ -198,7 +202,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         # What follows an input as slowly as the record is long, a drift explains as well.
         follows = tried[i].related and not spans_record(tried[i].best.fit)
         if not pairs.strong or (part > PART * spread[i] and follows):
-            fits[i] = tried[i]
+            pairs.put(i, tried[i])
             pairs.strong.append(i)
 
 
@@ -232,7 +236,8 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
                 whitening=whitening,
                 nuisance=best.problem.nuisance,
             )
-            fits[j] = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
+            fit = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
+            pairs.put(j, fit)
         # Not before all are right is one of them tested: alike, they take each other's share.
         while pairs.together(whitening, drop=names is structures):
             pass

@@ -1,7 +1,7 @@
 """The pairs of one output while they are fitted: what each input does, and all moved at once."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,8 +24,8 @@ class Pairs:
     """The pairs of one output, (n,), as far as they are fitted.
 
     `valid` are the samples that count before any fit, `strong` the inputs that are no weak
-    couplings, the strongest first; `alike` is as for `fit_together`. `fits` and `strong` are
-    changed in place.
+    couplings, the strongest first; `alike` is as for `fit_together`. `masks` are
+    the samples that each fit by itself counts. `fits`, `strong` and `masks` are changed in place.
     """
 
     y: Real
@@ -33,6 +33,7 @@ class Pairs:
     fits: dict[int, JointFit]
     strong: list[int]
     alike: Sequence[tuple[frozenset[int], Mask]]
+    masks: dict[int, Mask | None] = field(default_factory=dict)
 
     @property
     def kept(self) -> list[int]:
@@ -51,7 +52,7 @@ class Pairs:
     @property
     def cost(self) -> float:
         """Mean square of what all of them leave over."""
-        rest, counts = self.left(), common(self.valid, [self.fits[j] for j in self.kept])
+        rest, counts = self.left(), self.counted(self.kept)
         return float(np.mean(np.square(rest if counts is None else rest[counts])))
 
     @property
@@ -65,9 +66,17 @@ class Pairs:
         least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
+    def put(self, i: int, fit: JointFit) -> None:
+        """Take a fit of one input to what the others leave over, and the samples it counts."""
+        self.fits[i], self.masks[i] = fit, fit.problem.valid
+
+    def counted(self, some: Iterable[int]) -> Mask | None:
+        """Samples at which what some of the inputs do is known."""
+        return common([self.valid, *(self.masks[j] for j in some)])
+
     def counted_by_others(self, i: int) -> Mask | None:
-        """Samples that count for all inputs but one: those where what they do is known."""
-        return common(self.valid, [self.fits[j] for j in self.kept if j != i])
+        """Samples at which what all inputs but one do is known."""
+        return self.counted(j for j in self.kept if j != i)
 
     def left(self) -> Real:
         """What all of them leave over."""
@@ -100,7 +109,7 @@ class Pairs:
     ) -> tuple[list[Problem], list[Fit]]:
         """Fits to some of the inputs, all moved at once from where they begin."""
         fits = [self.fits[j] for j in some]
-        valid = common(None, fits)
+        valid = self.counted(some)
         problems = [replace(fit.problem, y=y, valid=valid, whitening=whitening) for fit in fits]
         structures, thetas = [fit.structure for fit in begun], [fit.theta for fit in begun]
         return problems, fit_all(problems, structures, thetas, hopeless=hopeless)
@@ -111,7 +120,8 @@ class Pairs:
         rows = before.problem.fixed()[1:]
         others = (one for k, one in zip(some, found, strict=True) if k != j)
         moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
-        own = replace(before.problem, y=y - sum(moved, np.zeros(y.size)))
+        valid = self.counted(some)  # the residual is known where all count
+        own = replace(before.problem, y=y - sum(moved, np.zeros(y.size)), valid=valid)
         best = replace(trial, fit=fit)
         if trial is not before.best:  # of another structure, nothing is known of one more pole
             before = replace(before, rivals=(), hidden=None)
