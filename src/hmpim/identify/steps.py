@@ -33,7 +33,6 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows
-from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
@@ -163,11 +162,11 @@ def _fit_and_look_for_rows(
         return fitted
     if several and question.intersample == "sampled":
         return fitted
-    if several and any(f.related and f.best.fit.structure.name not in PLAIN for f in fitted.fits):
+    if several and fitted.slow is not None:
         plainly = _plain_beside_drift(question, seen)
         if plainly is not None:
             return plainly
-    asked = fitted.suspect()
+    asked = fitted.leading if fitted.slow is None else fitted.slow
     joint, beside, humming = fitted.fits[asked], fitted, None
     hum = np.zeros(0)
 
@@ -208,7 +207,7 @@ def _fit_and_look_for_rows(
 def _plain_beside_drift(question: Question, seen: Imperfections) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, where they leave white noise."""
     plain = _fit_once(question, seen, question.plain)
-    asked = plain.suspect()
+    asked = plain.leading
 
     def with_rows(rows: Real) -> JointFit:
         nonlocal plain

@@ -15,7 +15,8 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.joint_errors import covariances, derivatives, own_lag
+from hmpim.identify.chance import SEARCHED
+from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
@@ -27,8 +28,9 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.autoregression import innovation_gain
 from hmpim.identify.section_iv.correlation import likeness
-from hmpim.identify.worth import NEARLY, PART, TWICE
+from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
@@ -70,12 +72,17 @@ class OutputFit:
                 total = total + contribution(fit)
         return total if self.disturbance is None else total + self.disturbance
 
-    def suspect(self) -> int:
-        """The input whose fit may have taken a drift for its own; else that which moves most."""
+    @property
+    def slow(self) -> int | None:
+        """An input whose fit may have taken a drift for its own; None where there is none."""
         for i, fit in enumerate(self.fits):
-            slow = spans_record(fit.best.fit) or fit.lingers
-            if fit.related and self.strong[i] and slow:
+            if fit.related and self.strong[i] and (spans_record(fit.best.fit) or fit.lingers):
                 return i
+        return None
+
+    @property
+    def leading(self) -> int:
+        """The input that moves the output most."""
         parts = [float(np.std(contribution(fit))) if fit.related else -1.0 for fit in self.fits]
         return int(np.argmax(parts))
 
@@ -199,11 +206,30 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         i = min(tried, key=lambda j: tried[j].best.fit.cost)
         waiting.remove(i)
         part = float(np.std(contribution(tried[i])))
-        # What follows an input as slowly as the record is long, a drift explains as well.
-        follows = tried[i].related and not spans_record(tried[i].best.fit)
-        if not pairs.strong or (part > PART * spread[i] and follows):
+        large = part > PART * pairs.spread or part**2 > PART * spread[i] ** 2
+        if not pairs.strong or (large and _is_followed(tried[i], rest[i], counted)):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
+
+
+def _is_followed(tried: JointFit, rest: Real, counted: Mask | None) -> bool:
+    """Whether a fit explains what is left over so much better than an autoregression does.
+
+    What is left over may be what the stronger inputs' models lack: friction has few innovations. A
+    pole as slow as the record explains a drift as well.
+    """
+    fit = tried.best.fit
+    if not tried.related or spans_record(fit):
+        return False
+    counts = common([counted, tried.problem.valid])
+    if counts is None:
+        counts = np.ones(rest.size, dtype=bool)
+    before = rest.size if counted is None else np.count_nonzero(counted)
+    if np.count_nonzero(counts) < MOST * before:
+        return False
+    gained = innovation_gain(rest[counts] - rest[counts].mean(), fit.residual[counts])
+    unknown = fit.structure.parameters + fit.initial.size
+    return bool(gained - 0.5 * unknown * np.log(counts.sum()) > SEARCHED)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

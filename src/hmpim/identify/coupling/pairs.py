@@ -61,9 +61,14 @@ class Pairs:
         return [self.fits[i].best.fit.structure for i in self.strong]
 
     @property
+    def spread(self) -> float:
+        """R.m.s. motion of the output."""
+        return float(np.std(self.y if self.valid is None else self.y[self.valid]))
+
+    @property
     def dominant(self) -> set[int]:
         """Inputs that move the output so much that what their models lack passes for a coupling."""
-        least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
+        least = PART * self.spread
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def put(self, i: int, fit: JointFit) -> None:
@@ -148,10 +153,10 @@ class Pairs:
         simpler = False
         for i in sorted(self.strong, key=lambda j: -self.fits[j].best.fit.structure.parameters):
             some, joint = self.kept, self.fits[i]
-            if i not in some:
-                continue
+            if i not in some or not joint.best.fit.is_white:
+                continue  # what is no noise is weighed by no criterion
             best, at = joint.best, some.index(i)
-            count = joint.problem.counted * joint.effective_share
+            count = joint.problem.counted
             least, chosen = 0.0, None
             for trial in joint.trials:
                 fewer = best.fit.structure.parameters - trial.fit.structure.parameters

@@ -173,13 +173,24 @@ def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
 
 
 @lru_cache(maxsize=16)
-def _chirp(bins: int, shifts: int, length: int) -> Any:
-    """The inverse transform of a few neighbouring bins at a few neighbouring samples.
+def _chirp(bins: int, shifts: int, length: int) -> tuple[Complex, Complex]:
+    """A chirp, and the transform of its conjugate about 0, for so many bins and shifts.
 
-    It costs transforms as long as both together (L. R. Rabiner, R. W. Schafer and C. M. Rader,
-    IEEE Trans. Audio Electroacoust. 17, 1969), and not as long as the record.
+    With c(k) = e^(jπk²/length), e^(2πj km/length) = c(k) c(m) / c(m - k): a sum over a few bins
+    at a few shifts is a convolution, which costs transforms as long as both together and not as
+    long as the record (L. I. Bluestein, IEEE Trans. Audio Electroacoust. 18, 1970).
     """
-    return scipy.signal.CZT(bins, shifts, np.exp(2j * np.pi / length))
+    k = np.arange(max(bins, shifts), dtype=np.int64)
+    chirp = _turned(k * k, 2 * length)
+    around = np.zeros(scipy.fft.next_fast_len(bins + shifts - 1), dtype=complex)
+    around[:shifts] = chirp[:shifts].conj()
+    around[around.size - bins + 1 :] = chirp[bins - 1 : 0 : -1].conj()
+    return chirp, np.asarray(scipy.fft.fft(around))
+
+
+def _turned(turns: NDArray[np.int64], length: int) -> Complex:
+    """e^(2πj turns/length); whole turns are taken off, since their rounding grows."""
+    return np.asarray(np.exp(2j * np.pi / length * (turns % length)))
 
 
 def _at_shifts(
@@ -187,11 +198,13 @@ def _at_shifts(
 ) -> NDArray[np.float64]:
     """Real parts of Σ rows e^(jω shift/finer) over the bins, at neighbouring shifts, (..., k)."""
     length, first = rough.length * finer, int(rough.bins[0])
-    dense = np.zeros((*rows.shape[:-1], int(rough.bins[-1]) - first + 1), dtype=complex)
+    count = int(rough.bins[-1]) - first + 1
+    chirp, around = _chirp(count, shifts.size, length)
+    dense = np.zeros((*rows.shape[:-1], around.size), dtype=complex)
     dense[..., rough.bins - first] = rows
-    dense *= np.exp(2j * np.pi / length * shifts[0] * np.arange(dense.shape[-1]))
-    sums = _chirp(dense.shape[-1], shifts.size, length)(dense)
-    return np.asarray((sums * np.exp(2j * np.pi / length * first * shifts)).real)
+    dense[..., :count] *= chirp[:count] * _turned(shifts[0] * np.arange(count), length)
+    sums = scipy.fft.ifft(scipy.fft.fft(dense) * around)[..., : shifts.size]
+    return np.asarray((sums * (chirp[: shifts.size] * _turned(first * shifts, length))).real)
 
 
 def starting_values(
