@@ -1,6 +1,6 @@
 """The steps of the algorithm in `hmpim.identify.identify`, in their order."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -169,12 +169,13 @@ def _fit_and_look_for_rows(
     asked = fitted.leading if fitted.slow is None else fitted.slow
     joint, beside, humming = fitted.fits[asked], fitted, None
     hum = np.zeros(0)
+    aside: dict[int, JointFit] = {}
 
     def with_rows(rows: Real, plainly: bool) -> JointFit:
         nonlocal beside, hum
         names = question.plain if plainly else question.structures
         every = rows if humming is None else np.vstack([rows, humming.rows])
-        beside = _fit_once(question, seen, names, every)
+        beside = _fit_once(question, seen, names, every, aside=aside)
         found = beside.fits[asked]
         if humming is None:
             return found
@@ -194,7 +195,13 @@ def _fit_and_look_for_rows(
         humming = with_hum(joint, with_rows)
     joint = joint if humming is None else humming.joint
     kept = fitted if humming is None else beside
-    joint, drifting = with_drift(joint, with_rows, steadily)
+    # Whether there is a drift, the inputs tell that the output is known to follow.
+    aside = {i: fit for i, fit in enumerate(kept.fits) if not fit.related} if several else {}
+    first = joint
+    joint, drifting = with_drift(first, with_rows, steadily)
+    if aside and drifting is not None:
+        aside = {}
+        joint, drifting = with_drift(first, with_rows, steadily)
     if drifting is not None and humming is not None:
         humming = replace(humming, trend=hum)
     kept = kept if drifting is None else beside
@@ -422,10 +429,12 @@ def _fit_once(
     rows: Real | None = None,
     *,
     begun: Course | None = None,
+    aside: Mapping[int, JointFit] | None = None,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell.
 
-    The search goes on from `begun`, where the plain fits to the one input are known.
+    The search goes on from `begun`, where the plain fits to the one input are known. Inputs that
+    stand `aside` are not asked.
     """
     if begun is not None:
         return OutputFit(fits=(chosen_of(begun, structures),))
@@ -439,4 +448,5 @@ def _fit_once(
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
+        aside=aside or {},
     )

@@ -8,9 +8,10 @@ coupling, which then looked like none. The error bars come from all pairs' deriv
 that inputs that resemble each other widen them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
@@ -105,6 +106,7 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
+    aside: Mapping[int, JointFit] = MappingProxyType({}),
 ) -> OutputFit:
     """Fit one output to several inputs.
 
@@ -121,13 +123,15 @@ def fit_together(
         not told from what the stronger one's model lacks.
     nuisance : ndarray, shape (k, n), optional
         Rows beside the bias that enter linearly, such as a drift's.
+    aside : mapping of int to JointFit
+        Inputs that are not asked, each with its fit, which is not related.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
+    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
     _join(inputs, pairs, plainly)
     if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
         pairs.refine(pairs.kept, None)
@@ -178,16 +182,18 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
 
 
 def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, each strong input to what all others leave over."""
+    """Fit, in place, each strong input to what all others leave over, unless that is as before."""
     for i in pairs.strong:
         rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
-        pairs.put(i, fitted(inputs[i], rest, valid=counted))
+        if not pairs.is_settled(i, rest, counted):
+            pairs.put(i, fitted(inputs[i], rest, valid=counted))
+            pairs.settle(i, rest, counted)
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit, in place, inputs that what is left over follows, the strongest first; at least one."""
     fits = pairs.fits
-    waiting = [j for j in range(len(inputs)) if j not in pairs.strong]
+    waiting = [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
     while waiting:
         left = {j: pairs.without_others(j) for j in waiting}
         counted = pairs.counted(pairs.strong)
@@ -207,9 +213,10 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         waiting.remove(i)
         part = float(np.std(contribution(tried[i])))
         large = part > PART * pairs.spread or part**2 > PART * spread[i] ** 2
-        if not pairs.strong or (large and _is_followed(tried[i], rest[i], counted)):
-            pairs.put(i, tried[i])
-            pairs.strong.append(i)
+        if pairs.strong and not (large and _is_followed(tried[i], rest[i], counted)):
+            break  # what is left resembles the others less
+        pairs.put(i, tried[i])
+        pairs.strong.append(i)
 
 
 def _is_followed(tried: JointFit, rest: Real, counted: Mask | None) -> bool:
@@ -243,7 +250,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     fits = pairs.fits
     best = fits[pairs.strong[0]]
     mode = best.best.intersample
-    weak = [j for j in range(len(inputs)) if j not in pairs.strong]
+    weak = [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
     if not weak:
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0

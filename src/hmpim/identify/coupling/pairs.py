@@ -1,6 +1,6 @@
 """The pairs of one output while they are fitted: what each input does, and all moved at once."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,8 +24,9 @@ class Pairs:
     """The pairs of one output, (n,), as far as they are fitted.
 
     `valid` are the samples that count before any fit, `strong` the inputs that are no weak
-    couplings, the strongest first; `alike` is as for `fit_together`. `masks` are
-    the samples that each fit by itself counts. `fits`, `strong` and `masks` are changed in place.
+    couplings, the strongest first, `aside` those that are not asked; `alike` is as for
+    `fit_together`, and `masks` are the samples that each fit by itself counts. `fits`, `strong`
+    and `masks` are changed in place.
     """
 
     y: Real
@@ -33,7 +34,9 @@ class Pairs:
     fits: dict[int, JointFit]
     strong: list[int]
     alike: Sequence[tuple[frozenset[int], Mask]]
+    aside: Mapping[int, JointFit]
     masks: dict[int, Mask | None] = field(default_factory=dict)
+    _seen: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
     @property
     def kept(self) -> list[int]:
@@ -74,6 +77,19 @@ class Pairs:
     def put(self, i: int, fit: JointFit) -> None:
         """Take a fit of one input to what the others leave over, and the samples it counts."""
         self.fits[i], self.masks[i] = fit, fit.problem.valid
+
+    def settle(self, i: int, rest: Real, counted: Mask | None) -> None:
+        """Note what the whole search for one input was made on."""
+        self._seen[i] = rest, counted
+
+    def is_settled(self, i: int, rest: Real, counted: Mask | None) -> bool:
+        """Whether it was made on the same: it would end as it did."""
+        if i not in self._seen:
+            return False
+        before, counts = self._seen[i]
+        if counts is None or counted is None:
+            return counts is counted and np.array_equal(before, rest)
+        return np.array_equal(counts, counted) and np.array_equal(before, rest)
 
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which what some of the inputs do is known."""
