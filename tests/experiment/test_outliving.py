@@ -103,7 +103,7 @@ def test_killed_it_comes_to_rest_and_the_record_is_kept_and_identified(tmp_path,
 
 def test_where_a_watchdog_is_needed_a_rig_without_one_is_refused(tmp_path):
     rig = Carriage(tmp_path / "t.txt")
-    with pytest.raises(RigError, match=r"'carriage' has no watchdog: .* or say --no-watchdog"):
+    with pytest.raises(RigError, match=r"'carriage' has no watchdog: .* or use --no-watchdog"):
         run(rig, SHORT, options=RunOptions(watchdog=True))
     assert (tmp_path / "t.txt").read_text() == ""
     log = RunLog()
