@@ -7,6 +7,7 @@ import pytest
 
 import hmpim
 from hmpim import HmpimError, LiveEstimator
+from hmpim.errors import ArgumentError
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.statistics.fit import Compressed, pulse
@@ -166,3 +167,15 @@ def test_an_estimate_so_far_goes_on_in_another_process():
         one, other = here.update(u[block], y[block]), there.update(u[block], y[block])
         there = pickle.loads(pickle.dumps(there))
     assert one.parameters.delay.value == pytest.approx(other.parameters.delay.value, abs=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_samples_come_one_at_a_time_or_in_pairs_that_match():
+    u, y = answered(10.0, 3)
+    live = LiveEstimator(STIMULUS)
+    with pytest.raises(ArgumentError, match="u has 0 samples and y 2"):
+        live.update([], y[:2])
+    assert live.update([], []) is None
+    for one, other in zip(u, y, strict=True):
+        last = live.update([one], [other])
+    assert last.parameters.delay.value == pytest.approx(0.15, abs=4 * last.parameters.delay.std)

@@ -67,7 +67,7 @@ def inverted(gram: Real) -> Real:
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     values = np.abs(values)
-    values = np.maximum(values, _EXACTLY * values.max())
+    values = np.maximum(values, max(_EXACTLY * values.max(), np.finfo(float).tiny))
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
 
 

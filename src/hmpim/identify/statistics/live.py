@@ -162,7 +162,7 @@ class LiveEstimator:
         Look or None
             None while there is too little to fit.
         """
-        if np.atleast_1d(numbers_of("u", u)).size == 0:
+        if not any(np.size(numbers_of(name, given)) for name, given in (("u", u), ("y", y))):
             return self._look
         self.read(u, y)
         return self.look()
