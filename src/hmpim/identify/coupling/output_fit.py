@@ -1,7 +1,9 @@
 """One output, several inputs at once: each pair's fit with the others taken out.
 
-The inputs that move the output most are fitted as if alone, each to what the others leave over;
-what is weak beside them (`hmpim.identify.coupling.weak`) follows, with the noise whitened.
+The input that moves the output most is fitted as if alone; others join as long as one explains
+much of what is left over, each with its own beginning and assumption between the samples. They are
+fitted in turns, each to what the others leave, until moving all at once gains little. What is weak
+beside them (`hmpim.identify.coupling.weak`) is fitted with the noise whitened.
 Then all pairs are moved at once, and only then is each coupling tested, the others allowed to take
 over: of two inputs that are alike at some frequencies, the first took a share of the other's
 coupling, which then looked like none. The error bars come from all pairs' derivatives together, so
@@ -66,7 +68,7 @@ class OutputFit:
     @property
     def prediction(self) -> Real:
         """What all inputs together predict of the output, bias and drift included, shape (n,)."""
-        first = self.fits[0].best.fit
+        first = next((fit for fit in self.fits if fit.related), self.fits[0]).best.fit
         total: Real = np.full(first.prediction.size, first.linear[-1])
         for fit in self.fits:
             if fit.related:
