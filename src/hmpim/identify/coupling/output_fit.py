@@ -18,7 +18,6 @@ from types import MappingProxyType
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
@@ -31,7 +30,6 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.autoregression import innovation_gain
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
@@ -213,32 +211,23 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         tried = {j: fitted(inputs[j], left[j], valid=counted) for j in likely}
         i = min(tried, key=lambda j: tried[j].best.fit.cost)
         waiting.remove(i)
-        part = float(np.std(contribution(tried[i])))
-        large = part > PART * pairs.spread or part**2 > PART * spread[i] ** 2
-        if pairs.strong and not (large and _is_followed(tried[i], rest[i], counted)):
-            break  # what is left resembles the others less
-        pairs.put(i, tried[i])
-        pairs.strong.append(i)
+        large = float(np.std(contribution(tried[i]))) > PART * spread[i]
+        if not pairs.strong or (large and _is_followed(tried[i], counted)):
+            pairs.put(i, tried[i])
+            pairs.strong.append(i)
 
 
-def _is_followed(tried: JointFit, rest: Real, counted: Mask | None) -> bool:
-    """Whether a fit explains what is left over so much better than an autoregression does.
+def _is_followed(tried: JointFit, counted: Mask | None) -> bool:
+    """Whether what is left over follows an input, where most of it is known.
 
-    What is left over may be what the stronger inputs' models lack: friction has few innovations. A
-    pole as slow as the record explains a drift as well.
+    A pole as slow as the record explains a drift as well, and what answers late enough to leave
+    out most of the record explains what the stronger inputs' models lack, such as friction.
     """
-    fit = tried.best.fit
-    if not tried.related or spans_record(fit):
+    if not tried.related or spans_record(tried.best.fit):
         return False
-    counts = common([counted, tried.problem.valid])
-    if counts is None:
-        counts = np.ones(rest.size, dtype=bool)
-    before = rest.size if counted is None else np.count_nonzero(counted)
-    if np.count_nonzero(counts) < MOST * before:
-        return False
-    gained = innovation_gain(rest[counts] - rest[counts].mean(), fit.residual[counts])
-    unknown = fit.structure.parameters + fit.initial.size
-    return bool(gained - 0.5 * unknown * np.log(counts.sum()) > SEARCHED)
+    counts, size = common([counted, tried.problem.valid]), tried.problem.y.size
+    before = size if counted is None else np.count_nonzero(counted)
+    return bool((size if counts is None else np.count_nonzero(counts)) > MOST * before)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:
