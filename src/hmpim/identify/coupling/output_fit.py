@@ -133,8 +133,6 @@ def fit_together(
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
     _join(inputs, pairs, plainly)
-    if len(pairs.strong) > 1:  # each was fitted with the later ones unknown
-        pairs.refine(pairs.kept, None)
     asked = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
@@ -193,7 +191,7 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit, in place, inputs that what is left over follows, the strongest first; at least one."""
     fits = pairs.fits
-    waiting = [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
+    waiting = _waiting(inputs, pairs)
     while waiting:
         left = {j: pairs.without_others(j) for j in waiting}
         counted = pairs.counted(pairs.strong)
@@ -215,6 +213,13 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         if not pairs.strong or (large and _is_followed(tried[i], counted)):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
+            pairs.refine(pairs.kept if len(pairs.strong) > 1 else [], None)
+            waiting = _waiting(inputs, pairs)  # what is left is clearer now
+
+
+def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
+    """Inputs that are asked and not strong."""
+    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
 
 
 def _is_followed(tried: JointFit, counted: Mask | None) -> bool:
@@ -241,7 +246,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     fits = pairs.fits
     best = fits[pairs.strong[0]]
     mode = best.best.intersample
-    weak = [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
+    weak = _waiting(inputs, pairs)
     if not weak:
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
