@@ -120,7 +120,7 @@ def one_test(seed: int) -> Test:
             invented += told and not real
             for name, value in truth(i, j).items() if real else ():
                 estimate = getattr(pair.parameters, name)
-                if estimate is not None:
+                if estimate is not None and estimate.ci95 is not None:
                     held = bool(estimate.ci95[0] <= value <= estimate.ci95[1])
                     (direct if i == j else couplings).append((name, held))
     return Test(direct, couplings, missed, invented, spent)

@@ -151,6 +151,8 @@ def fit_together(
         simpler = pairs.simplify()
         if not others and not simpler and pairs.cost * TWICE > left:
             break  # else each was fitted to the wrong rest
+    if pairs.demote():
+        _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
 
 
@@ -252,7 +254,8 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
     rest = pairs.left()
     whitening = whitening_of(rest)
-    sources = {j: prepare_input(inputs[j], mode) for j in weak}
+    modes = {j: fits[j].best.intersample if j in fits else mode for j in weak}
+    sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
     for names in (structures,) if known else (roughly, structures):  # each whitened anew
@@ -265,7 +268,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
                 whitening=whitening,
                 nuisance=best.problem.nuisance,
             )
-            fit = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
+            fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
             pairs.put(j, fit)
         # Not before all are right is one of them tested: alike, they take each other's share.
         while pairs.together(whitening, drop=names is structures):

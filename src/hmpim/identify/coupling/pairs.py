@@ -12,7 +12,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import PART, TWICE
+from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
 
@@ -193,6 +193,29 @@ class Pairs:
                 simpler = True
         return simpler
 
+    def demote(self) -> bool:
+        """Take those for couplings again that stand little above the noise, now that it is known.
+
+        What is left open of a coupling, its error bars are widened by. All couplings are forgotten:
+        of two inputs that are alike, the first may have taken a share of the other's.
+
+        Returns
+        -------
+        bool
+            Whether there are any.
+        """
+        noise, dominant = float(np.sqrt(self.cost)), self.dominant
+        low = [
+            j
+            for j in self.strong[1:]
+            if j not in dominant and noise > FEW * float(np.std(contribution(self.fits[j])))
+        ]
+        for j in low:
+            self.strong.remove(j)
+        for j in [j for j in self.fits if low and j not in self.strong and j not in self.aside]:
+            del self.fits[j]
+        return bool(low)
+
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
         """Move all couplings at once; leave out the least if it adds nothing and may go.
 
@@ -201,22 +224,24 @@ class Pairs:
         bool
             Whether one was left out.
         """
-        weak = [j for j in self.kept if j not in self.strong]
+        dominant = self.dominant
+        moved = [j for j in self.kept if j not in dominant]
+        weak = [j for j in moved if j not in self.strong]
         if not weak:
             return False
-        dominant = self.dominant
-        problems, found = self.refine(weak, whitening, self.without(self.strong))
+        problems, found = self.refine(moved, whitening, self.without(dominant))
         if not drop:
             return False
-        gains = []
-        for k, j in enumerate(weak):
+        gains = {}
+        for j in weak:
+            k = moved.index(j)
             shared = [bins for group, bins in self.alike if j in group and group & dominant]
             slow = _too_slow(found[k], self.y.size)
-            gains.append(0.0 if slow else gained_by(_apart(problems, shared), found, k))
-        least = int(np.argmin(gains))
+            gains[j] = 0.0 if slow else gained_by(_apart(problems, shared), found, k)
+        least = min(weak, key=gains.__getitem__)
         if gains[least] > SEARCHED:
             return False
-        self.fits[weak[least]] = replace(self.fits[weak[least]], related=False)
+        self.fits[least] = replace(self.fits[least], related=False)
         return True
 
 
