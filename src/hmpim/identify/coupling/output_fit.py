@@ -254,7 +254,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
     rest = pairs.left()
     whitening = whitening_of(rest)
-    modes = {j: fits[j].best.intersample if j in fits else mode for j in weak}
+    modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)

@@ -15,6 +15,7 @@ from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
+from hmpim.record import Intersample
 
 __all__ = ["Pairs", "constant_of", "contribution"]
 
@@ -25,8 +26,9 @@ class Pairs:
 
     `valid` are the samples that count before any fit, `strong` the inputs that are no weak
     couplings, the strongest first, `aside` those that are not asked; `alike` is as for
-    `fit_together`, and `masks` are the samples that each fit by itself counts. `fits`, `strong`
-    and `masks` are changed in place.
+    `fit_together`, and `masks` are the samples that each fit by itself counts; `between` is what
+    a coupling that was strong was found to do between the samples. All but `y`, `valid`, `alike`
+    and `aside` are changed in place.
     """
 
     y: Real
@@ -36,6 +38,7 @@ class Pairs:
     alike: Sequence[tuple[frozenset[int], Mask]]
     aside: Mapping[int, JointFit]
     masks: dict[int, Mask | None] = field(default_factory=dict)
+    between: dict[int, Intersample] = field(default_factory=dict)
     _seen: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
     @property
@@ -194,10 +197,10 @@ class Pairs:
         return simpler
 
     def demote(self) -> bool:
-        """Take those for couplings again that stand little above the noise, now that it is known.
+        """Take those for couplings again that resemble others and stand little above the noise.
 
-        What is left open of a coupling, its error bars are widened by. All couplings are forgotten:
-        of two inputs that are alike, the first may have taken a share of the other's.
+        Of two inputs that are alike, the first may have taken a share of the other's: all couplings
+        are forgotten, to be fitted before one is tested.
 
         Returns
         -------
@@ -205,13 +208,15 @@ class Pairs:
             Whether there are any.
         """
         noise, dominant = float(np.sqrt(self.cost)), self.dominant
+        alike = frozenset[int]().union(*(group for group, _ in self.alike))
         low = [
             j
             for j in self.strong[1:]
-            if j not in dominant and noise > FEW * float(np.std(contribution(self.fits[j])))
+            if j in alike - dominant and noise > 2 * FEW * float(np.std(contribution(self.fits[j])))
         ]
         for j in low:
             self.strong.remove(j)
+            self.between[j] = self.fits[j].best.intersample
         for j in [j for j in self.fits if low and j not in self.strong and j not in self.aside]:
             del self.fits[j]
         return bool(low)
