@@ -162,11 +162,13 @@ def _fit_and_look_for_rows(
         return fitted
     if several and question.intersample == "sampled":
         return fitted
-    if several and fitted.slow is not None:
+    asked, slow = 0, fitted.slow if several else None
+    if slow is not None:
         plainly = _plain_beside_drift(question, seen)
         if plainly is not None:
             return plainly
-    asked = fitted.leading if fitted.slow is None else fitted.slow
+    if several:
+        asked = fitted.leading if slow is None else slow
     joint, beside, humming = fitted.fits[asked], fitted, None
     hum = np.zeros(0)
     aside: dict[int, JointFit] = {}

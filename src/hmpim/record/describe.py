@@ -88,8 +88,10 @@ def describe(series: Series, *, fs: float | None = None) -> tuple[Description, C
     time = series.time
     if time is None and fs is not None:
         time = np.arange(series.values.size) / fs
-    again, doubled, backward = _odd_stamps(time)
-    channel, problem = _channel(series, time, fs)
+    starts = np.zeros(0, dtype=np.int64) if time is None else restarts(time)
+    reverse = "" if time is None else backward_words(time, starts)
+    again, doubled, backward = _odd_stamps(time, 0 if reverse else int(starts.size))
+    channel, problem = _channel(series, time, fs, reverse)
     rate, jitter, gaps, longest = _clock_figures(channel)
     stamped = None if time is None else time[np.isfinite(time)]
     if rate is None and stamped is not None and stamped.size > 1:
@@ -118,23 +120,20 @@ def describe(series: Series, *, fs: float | None = None) -> tuple[Description, C
     )
 
 
-def _odd_stamps(time: NDArray[np.float64] | None) -> tuple[int, int, int]:
+def _odd_stamps(time: NDArray[np.float64] | None, again: int) -> tuple[int, int, int]:
     if time is None:
         return 0, 0, 0
-    starts = restarts(time)
-    again = 0 if backward_words(time, starts) else int(starts.size)
     steps = np.diff(time[np.isfinite(time)])
     return again, int(np.count_nonzero(steps == 0)), int(np.count_nonzero(steps < 0)) - again
 
 
 def _channel(
-    series: Series, time: NDArray[np.float64] | None, fs: float | None
+    series: Series, time: NDArray[np.float64] | None, fs: float | None, reverse: str
 ) -> tuple[Channel | None, str]:
     if time is None:
         return None, "it has no time: name it with --time, or give the rate with --fs"
-    backward = backward_words(time, restarts(time))
-    if backward:
-        return None, f"time {backward}"
+    if reverse:
+        return None, f"time {reverse}"
     unit = series.unit
     try:
         check_unit(unit)

@@ -244,17 +244,24 @@ def test_a_pulled_cable_is_noticed_and_the_far_end_comes_to_rest(way):
     assert last / 500.0 - cut[0] <= 0.1 + 0.01
 
 
-def test_a_far_end_that_trips_says_why():
-    clock = ManualClock()
-    network = Network(clock, farend=FarEnd(hello()))
+def tripping(network, clock):
+    """A plant whose far end trips after 2 s of the run."""
 
     class Tripping(Lag):
         def advance(self, order):
+            assert clock.now() < 20.0, "still waiting"
             if clock.now() > 2.0:
                 network.farend.trip("oil pressure low")
             return super().advance(order)
 
-    network.plant = Tripping(2, 500.0)
+    return Tripping(2, 500.0)
+
+
+def test_a_far_end_that_trips_says_why():
+    clock = ManualClock()
+    network = Network(clock, farend=FarEnd(hello()))
+
+    network.plant = tripping(network, clock)
     with pytest.raises(RigError, match="'bench' stopped by itself: oil pressure low"):
         run(WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock))
     assert network.farend.state is State.FAULT
@@ -347,14 +354,7 @@ def test_a_reason_that_is_lost_is_not_waited_for_for_ever():
 
     network = Mangling(clock, silent)
 
-    class Tripping(Lag):
-        def advance(self, order):
-            assert clock.now() < 20.0, "still waiting"
-            if clock.now() > 2.0:
-                network.farend.trip("oil pressure low")
-            return super().advance(order)
-
-    network.plant = Tripping(2, 500.0)
+    network.plant = tripping(network, clock)
     with pytest.raises(RigError, match="'bench' stopped by itself: no reason given"):
         run(WireRig(transport=network, clock=clock), SWEEP, options=RunOptions(clock=clock))
 

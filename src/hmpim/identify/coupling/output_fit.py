@@ -13,7 +13,6 @@ that inputs that resemble each other widen them.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from types import MappingProxyType
 
 import numpy as np
 
@@ -106,7 +105,7 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
-    aside: Mapping[int, JointFit] = MappingProxyType({}),
+    aside: Mapping[int, JointFit],
 ) -> OutputFit:
     """Fit one output to several inputs.
 

@@ -16,6 +16,7 @@ import scipy
 from hmpim.identify.arrays import Real, averaged
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.candidates import nested
+from hmpim.identify.fitting.course import bridged
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
@@ -86,10 +87,7 @@ def coupling_fit(
     is returned is without it. The input has shape (n,); what it does between its samples is as
     found for the strongest input.
     """
-    index = np.arange(u.size)
-    y = problem.y
-    if problem.valid is not None:
-        y = np.interp(index, index[problem.valid], y[problem.valid])
+    y = problem.y if problem.valid is None else bridged(problem.y, problem.valid)
     # Both whitened alike: the ratio stays, and noise at low frequencies hides no delay.
     plain = replace(problem, valid=None)
     rough = rough_response(
