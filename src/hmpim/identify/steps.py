@@ -198,7 +198,9 @@ def _fit_and_look_for_rows(
     joint = joint if humming is None else humming.joint
     kept = fitted if humming is None else beside
     # Whether there is a drift, the inputs tell that the output is known to follow.
-    aside = {i: fit for i, fit in enumerate(kept.fits) if not fit.related} if several else {}
+    aside = {i: fit for i, fit in enumerate(kept.fits) if not fit.related}
+    if len(aside) == len(kept.fits):
+        aside = {}
     first = joint
     joint, drifting = with_drift(first, with_rows, steadily)
     if aside and drifting is not None:

@@ -17,6 +17,7 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
@@ -29,7 +30,9 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.section_iv.correlation import likeness
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
@@ -131,6 +134,7 @@ def fit_together(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
+    _lead(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
     asked = pairs.cost
     _fit_couplings(inputs, pairs, plain)
@@ -189,33 +193,65 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
             pairs.settle(i, rest, counted)
 
 
+def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
+    """Fit, in place, the input that the output follows most."""
+    level = pairs.y if pairs.valid is None else bridged(pairs.y, pairs.valid)
+    share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
+    tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in _likely(share)}
+    i = min(tried, key=lambda j: tried[j].best.fit.cost)
+    pairs.put(i, tried[i])
+    pairs.strong.append(i)
+
+
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, inputs that what is left over follows, the strongest first; at least one."""
-    fits = pairs.fits
-    waiting = _waiting(inputs, pairs)
-    while waiting:
-        left = {j: pairs.without_others(j) for j in waiting}
+    """Fit, in place, inputs that much of what is left over follows, the strongest first."""
+    tried: dict[int, JointFit] = {}
+    share = _shares(inputs, pairs)
+    while share:
         counted = pairs.counted(pairs.strong)
-        constant = constant_of(fits[pairs.strong[0]]) if pairs.strong else 0.0
-        rest = {j: one - constant for j, one in left.items()}
-        if counted is not None:
-            rest = {j: bridged(one, counted) for j, one in rest.items()}
-        spread = {j: max(float(np.std(one)), 1e-300) for j, one in rest.items()}
-        share = {j: _follows_at_all(inputs[j], rest[j]) / spread[j] for j in waiting}
-        most = max(share.values())
-        if pairs.strong and most < PART:
-            break
-        # A delayed copy of an input correlates as well; which one it is the fit tells.
-        likely = [j for j in waiting if share[j] > NEARLY * most]
-        tried = {j: fitted(inputs[j], left[j], valid=counted) for j in likely}
-        i = min(tried, key=lambda j: tried[j].best.fit.cost)
-        waiting.remove(i)
-        large = float(np.std(contribution(tried[i]))) > PART * spread[i]
-        if not pairs.strong or (large and _is_followed(tried[i], counted)):
+        likely = _likely(share)
+        for j in likely:
+            if j not in tried:
+                tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
+        i = min(likely, key=lambda j: tried[j].best.fit.cost)
+        del share[i]
+        if _is_large(tried[i]) and _is_followed(tried[i], counted):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
-            pairs.refine(pairs.kept if len(pairs.strong) > 1 else [], None)
-            waiting = _waiting(inputs, pairs)  # what is left is clearer now
+            pairs.refine(pairs.kept, None)
+            tried, share = {}, _shares(inputs, pairs)  # what is left is clearer now
+
+
+def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
+    """Share (r.m.s.) of what is left over that correlates with each input, where it is much.
+
+    Friction correlates with an input that does not cause it; what follows one does so over all its
+    band.
+    """
+    waiting = _waiting(inputs, pairs)
+    counted = pairs.counted(pairs.strong)
+    constant = constant_of(pairs.fits[pairs.strong[0]])
+    found = {}
+    for j in waiting:
+        rest = pairs.without_others(j) - constant
+        if counted is not None:
+            rest = bridged(rest, counted)
+        share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
+        if share > PART and _chance(inputs[j], rest) < FALSE_ALARM / len(waiting):
+            found[j] = share
+    return found
+
+
+def _likely(share: Mapping[int, float]) -> list[int]:
+    """Inputs that may be the strongest: a delayed copy of one correlates as well."""
+    return [j for j, one in share.items() if one >= NEARLY * max(share.values())]
+
+
+def _is_large(fit: JointFit) -> bool:
+    """Whether an input is much of what the others leave over."""
+    counts = slice(None) if fit.problem.valid is None else fit.problem.valid
+    left = fit.problem.y - constant_of(fit)
+    return float(np.std(contribution(fit)[counts])) > PART * float(np.std(left[counts]))
 
 
 def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
@@ -234,6 +270,12 @@ def _is_followed(tried: JointFit, counted: Mask | None) -> bool:
     counts, size = common([counted, tried.problem.valid]), tried.problem.y.size
     before = size if counted is None else np.count_nonzero(counted)
     return bool((size if counts is None else np.count_nonzero(counts)) > MOST * before)
+
+
+def _chance(u: Real, y: Real) -> float:
+    """Chance that what does not follow the input resembles it as much."""
+    lag = likeness(u, y, u.size // 2 - 1).lag
+    return misfit(u, y, delay=float(lag), band=excited_band(u, 1.0)).probability
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

@@ -95,7 +95,7 @@ def coupling_fit(
     )
     fits: list[Fit] = []
     asked = tuple(name for name in structures if name in PLAIN) or PLAIN  # no more is seen of it
-    if not np.any(plain.masked(y)):  # nothing is left to tell a pole by
+    if not np.any(rough.response):  # nothing is left to tell a pole by
         asked = ("static",)
     for name in sorted(asked, key=lambda name: STRUCTURES[name].order):
         structure = STRUCTURES[name]
