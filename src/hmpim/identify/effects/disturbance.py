@@ -4,22 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
 __all__ = ["gain_by_rows", "without_rows"]
 
 
-def gain_by_rows(one: JointFit, count: int, former: Fit, forgotten: int) -> float:
+def gain_by_rows(one: JointFit, count: int, former: Fit, without: Problem) -> float:
     """Gain in Schwarz's criterion by adding `count` rows; `former` is the fit without them.
 
-    Each residual is modelled as an autoregression over the samples that count in both; the former
-    fit left out the first `forgotten`. An initial state that is fitted has its parameters too.
+    Each residual is modelled as an autoregression over the samples that count in both. An initial
+    state that is fitted has its parameters too.
     """
-    size = one.problem.y.size
-    counts = np.ones(size, bool) if one.problem.valid is None else one.problem.valid.copy()
-    counts[: max(one.forgotten, forgotten)] = False
+    counts = np.ones(one.problem.y.size, bool)
+    for problem, begins in ((one.problem, one.forgotten), (without, without.begins)):
+        counts[: begins or 0] = False
+        if problem.valid is not None:
+            counts &= problem.valid
     if not counts.any():
         return -np.inf
     fit = one.best.fit

@@ -22,6 +22,7 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
@@ -105,11 +106,11 @@ def with_drift(
     columns = _shape(joint, columns)
     # The structure is chosen once more, now that the drift is known.
     joint = fitted(columns, is_white(joint.best.fit.residual))
-    gain = gain_by_rows(joint, len(columns), first.best.fit, first.forgotten)
+    gain = gain_by_rows(joint, len(columns), first.best.fit, first.problem)
     if gain < (-2 * CLEARLY if _passes_for_drift(first, joint) else 0.0):
         return first, None
     steady, rows = steadily(joint), len(columns)
-    if steady and gain_by_rows(joint, rows, steady.best.fit, steady.forgotten) < 0.0:
+    if steady and gain_by_rows(joint, rows, steady.best.fit, steady.problem) < 0.0:
         return steady, None
     drifting = _described(joint, columns, rival=first.best.fit if gain < 2 * LIKELIER else None)
     return drifting.joint, drifting
@@ -143,7 +144,7 @@ def with_plain_drift(
     joint = fitted(columns)
     if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
         return None
-    gain = gain_by_rows(joint, len(columns), fit, problem.begins or 0)
+    gain = gain_by_rows(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
     return _described(joint, columns, rival=fit if gain < 2 * LIKELIER else None)
@@ -220,14 +221,19 @@ def _polynomials(size: int, degree: int) -> Real:
 
 
 def _shape(joint: JointFit, columns: Real) -> Real:
-    """Rows that serve, by Schwarz's criterion on model's residual and polynomial, shape (k, n)."""
+    """Rows that serve, by Schwarz's criterion on model's residual and polynomial, shape (k, n).
+
+    The state that the record begins with gives way: it looks like a beginning of the drift.
+    """
     problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
     left = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
     count = problem.counted  # of a wander, the more is taken out the better
+    free = part_of(problem, fit.structure, fit.theta).free
+    always = np.vstack([free, np.ones(problem.y.size)])
 
     def cost(shapes: Real) -> float:
-        rows = np.vstack([shapes, np.ones(problem.y.size)])[:, counts]
+        rows = np.vstack([shapes, always])[:, counts]
         rest = left - solved(rows @ rows.T, rows @ left) @ rows
         return count * float(np.log(max(float(rest @ rest), np.finfo(float).tiny)))
 

@@ -323,7 +323,7 @@ def _settled(
         joint=joint,
         told=replace(told, std=_deviation(data, constant, told)),
         gained=gain_by_rows(
-            replace(joint, best=even), len(told.rows), first.best.fit, first.forgotten
+            replace(joint, best=even), len(told.rows), first.best.fit, first.problem
         ),
         course=course,
         level=level,

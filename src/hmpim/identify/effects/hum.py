@@ -69,7 +69,7 @@ def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Hummi
     rows = np.vstack([_rows_of(first, one) for one in frequencies])
     # Lines that are the lesser part of what is left over hid no dynamics.
     joint = fitted(rows, share < MOST and first.best.fit.structure.name in PLAIN)
-    if gain_by_rows(joint, rows.shape[0], first.best.fit, first.forgotten) < 0.0:
+    if gain_by_rows(joint, rows.shape[0], first.best.fit, first.problem) < 0.0:
         return None
     parts = joint.best.fit.nuisance.reshape(-1, _ROWS)
     sizes = np.hypot(parts[:, 0], parts[:, 1])
