@@ -1,8 +1,8 @@
 """The steps of the algorithm in `hmpim.identify.identify`, in their order."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import fit_through
 from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.coupling.output_fit import OutputFit, fit_together
-from hmpim.identify.effects.disturbance import without_rows
-from hmpim.identify.effects.drift import with_drift, with_plain_drift
+from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
+from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.hum import line_near, with_hum
 from hmpim.identify.effects.imperfections import (
@@ -139,11 +139,13 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     """Plain dynamics and a drift, where they leave white noise."""
     valid, former = _counted(question, seen), course
 
-    def with_rows(rows: Real) -> JointFit:
+    def with_rows(rows: Real, _: bool) -> JointFit:
         nonlocal course
         course = continued(course, valid=valid, nuisance=rows)
         return chosen_of(course, question.plain)
 
+    if not is_slow(former.problem, former.best):
+        return None
     drifting = with_plain_drift(former.problem, former.best, with_rows)
     if drifting is None or not drifting.joint.related:
         return None
@@ -156,17 +158,18 @@ def _fit_and_look_for_rows(
     question: Question, seen: Imperfections, begun: Course | None = None
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual asks for them."""
-    fitted = _fit_once(question, seen, question.structures, begun=begun)
+    steady = question.exact or question.intersample == "sampled"
+    drifts = None if steady else partial(_plain_beside_drift, question, seen)
+    fitted = _fit_once(question, seen, question.structures, begun=begun, drifts=drifts)
     several = len(fitted.fits) > 1
+    if fitted.drifting is not None:
+        return fitted
     if fitted.fits[0].silent or question.swapped or question.exact:
         return fitted
     if several and question.intersample == "sampled":
         return fitted
-    asked, slow = 0, fitted.slow if several else None
-    if slow is not None:
-        plainly = _plain_beside_drift(question, seen)
-        if plainly is not None:
-            return plainly
+    slow = fitted.slow if several else None
+    asked = 0
     if several:
         asked = fitted.leading if slow is None else slow
     joint, beside, humming = fitted.fits[asked], fitted, None
@@ -215,19 +218,30 @@ def _fit_and_look_for_rows(
     return replace(kept, fits=(joint,), steady=None if drifting is None else fitted.prediction)
 
 
-def _plain_beside_drift(question: Question, seen: Imperfections) -> OutputFit | None:
-    """Plain dynamics of several inputs and a drift, where they leave white noise."""
-    plain = _fit_once(question, seen, question.plain)
-    asked = plain.leading
+def _plain_beside_drift(
+    question: Question, seen: Imperfections, asked: int, first: JointFit
+) -> OutputFit | None:
+    """Plain dynamics of several inputs and a drift, where they leave white noise.
 
-    def with_rows(rows: Real) -> JointFit:
-        nonlocal plain
-        plain = _fit_once(question, seen, question.plain, rows)
-        return plain.fits[asked]
+    `first` is the plain fit to the input that leads, `asked`, as if it were the only one.
+    """
+    if first.best.fit.is_white:
+        return None
+    plain, count = OutputFit(fits=(first,)), 0
 
-    first = plain.fits[asked]
+    def with_rows(rows: Real, briefly: bool) -> JointFit:
+        nonlocal plain, count
+        plain, count = _fit_once(question, seen, question.plain, rows, briefly=briefly), len(rows)
+        return plain.fits[0 if briefly else asked]
+
     drifting = with_plain_drift(first.problem, first.best.fit, with_rows)
-    if drifting is None:
+    if drifting is None or not drifting.joint.related:
+        return None
+    steady = _fit_once(question, seen, question.plain)
+    former = steady.fits[asked]
+    if former.best.fit.is_white and steady.slow is None:
+        return None
+    if gain_by_rows(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
         return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=drifting, asked=asked)
@@ -434,11 +448,13 @@ def _fit_once(
     *,
     begun: Course | None = None,
     aside: Mapping[int, JointFit] | None = None,
+    drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
+    briefly: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell.
 
     The search goes on from `begun`, where the plain fits to the one input are known. Inputs that
-    stand `aside` are not asked.
+    stand `aside` are not asked; `drifts` and `briefly` are as for `fit_together`.
     """
     if begun is not None:
         return OutputFit(fits=(chosen_of(begun, structures),))
@@ -453,4 +469,6 @@ def _fit_once(
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
         aside=aside or {},
+        drifts=drifts,
+        briefly=briefly,
     )

@@ -27,6 +27,11 @@ from tests_support import in_studies
         ("by chance", 406, 79),  # a spike that is clipped is none of the plateau
         ("by chance, more", 408, 67),  # a lead-lag steps through: the likelihood jumps
         ("noisy", 404, 9),  # a pole that would not show moves the -3 dB bandwidth too
+        ("two inputs, drift", 881, 49),  # another input's poles stand for a drift
+        ("two inputs, drift", 881, 21),  # samples that one fit left out counted as right
+        ("two inputs, drift", 881, 35),  # a free response begins as a warm-up does
+        ("two inputs, mid-sweep", 883, 38),  # a drift stands for what the record begins with
+        ("two inputs, missing", 883, 9),  # few samples are known, and early ones
         *in_studies(
             ("Bessel", 222, 0),  # a linear input stands in for a third pole
             ("Bessel", 404, 6),  # a sixth pole would not show, and takes of the delay

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
+from hmpim.identify.coupling import output_fit
 
 FS, SAMPLES = 100.0, 2000
 NOISE = 0.01
@@ -92,3 +93,29 @@ def test_a_drift_and_a_hum_are_fitted_beside_several_inputs(disturbance, codes):
     )
     residual = found.data.outputs[0].values - 0.5 - disturbance - whole
     assert np.std(residual) == pytest.approx(NOISE, rel=0.1)
+
+
+@pytest.mark.parametrize(("frequency", "width"), [(0.7, 2.0), (0.7, 4.0), (0.3, 4.0)])
+def test_no_search_is_spent_on_an_input_that_a_wobble_resembles(monkeypatch, frequency, width):
+    # At the best lag a sweep correlates with any burst inside its band.
+    searched = []
+
+    def joint_fit(u, y, **options):
+        searched.append(u)
+        return whole(u, y, **options)
+
+    whole = output_fit.joint_fit
+    monkeypatch.setattr(output_fit, "joint_fit", joint_fit)
+    time = np.arange(3000) / FS
+    moving = np.sin(2 * np.pi * (0.1 * time + 0.1 * time**2))
+    still = np.sin(2 * np.pi * (0.15 * time + 0.02 * time**2) + 1.0)
+    burst = np.exp(-(((time - 20.0) / width) ** 2))
+    y = hmpim.simulate(model(4.0, 0.5, 0.02, 1.0), moving, fs=FS, intersample="bandlimited")
+    y = y + 0.2 * np.sin(2 * np.pi * frequency * time) * burst
+    y = y + 0.002 * np.random.default_rng(1).standard_normal(time.size)
+    found = hmpim.identify(
+        hmpim.Record.from_arrays({"moving": moving, "still": still}, {"y": y}, fs=FS)
+    )
+    assert any(np.array_equal(u, moving) for u in searched)
+    assert not any(np.array_equal(u, still) for u in searched)
+    assert found["y", "still"].verdict == "not_identifiable"

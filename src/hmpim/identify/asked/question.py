@@ -19,6 +19,7 @@ from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import ROUNDING
 from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal
+from hmpim.record.slower import restored
 
 __all__ = ["Question", "recognise_software"]
 
@@ -54,8 +55,8 @@ class Question:
 
     @property
     def measured(self) -> Mask | None:
-        """Samples at which every input was measured, shape (n,); None when all were."""
-        told = np.logical_and.reduce([source.valid for source in self.aligned.inputs])
+        """Samples at which every input is known, shape (n,); None when all are."""
+        told = np.logical_and.reduce([_known(source) for source in self.aligned.inputs])
         return None if bool(told.all()) else np.asarray(told)
 
     def band(self, i: int) -> tuple[float, float]:
@@ -64,6 +65,15 @@ class Question:
             return self.inputs.bands[i]
         source, aligned = self.aligned.inputs[i], self.aligned
         return self.record.band or excited_band(source.values, aligned.fs)
+
+
+def _known(source: Signal) -> Mask:
+    """Samples that were measured, and those lost that the others tell of an input that holds."""
+    place = np.arange(source.valid.size)
+    before = np.maximum.accumulate(np.where(source.valid, place, 0))
+    after = np.minimum.accumulate(np.where(source.valid, place, place[-1])[::-1])[::-1]
+    stands = source.values[before] == source.values[after]
+    return np.asarray(source.valid | stands | restored(source.values, source.valid)[1])
 
 
 def recognise_software(question: Question) -> Question:

@@ -18,7 +18,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
+from hmpim.identify.coupling.joint_errors import covariances, derivatives, own_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
@@ -109,6 +109,8 @@ def fit_together(
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
     aside: Mapping[int, JointFit],
+    drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
+    briefly: bool = False,
 ) -> OutputFit:
     """Fit one output to several inputs.
 
@@ -127,6 +129,12 @@ def fit_together(
         Rows beside the bias that enter linearly, such as a drift's.
     aside : mapping of int to JointFit
         Inputs that are not asked, each with its fit, which is not related.
+    drifts : callable, optional
+        Fits plain dynamics with a drift, given the input that leads and its plain fit: others may
+        take a drift for their own. What it returns is taken, unless it is None.
+    briefly : bool
+        Whether plain dynamics of what is strong are all that is fitted; the input that leads is
+        then all that is returned.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -135,7 +143,14 @@ def fit_together(
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
     _lead(inputs, pairs, plainly)
+    if drifts is not None:
+        drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
+        if drifting is not None:
+            return drifting
     _join(inputs, pairs, plainly)
+    if briefly:
+        pairs.refine(pairs.kept, None)
+        return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
     asked = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
@@ -215,7 +230,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and _is_followed(tried[i], counted):
+        if _is_large(tried[i]) and _is_followed(tried[i]):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
@@ -230,6 +245,8 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
+    if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
+        counted = pairs.valid  # nothing is told of what is hardly seen
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found = {}
     for j in waiting:
@@ -259,23 +276,32 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
     return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
 
 
-def _is_followed(tried: JointFit, counted: Mask | None) -> bool:
-    """Whether what is left over follows an input, where most of it is known.
+def _is_followed(tried: JointFit) -> bool:
+    """Whether what is left over follows an input, and not too late.
 
     A pole as slow as the record explains a drift as well, and what answers late enough to leave
     out most of the record explains what the stronger inputs' models lack, such as friction.
     """
-    if not tried.related or spans_record(tried.best.fit):
-        return False
-    counts, size = common([counted, tried.problem.valid]), tried.problem.y.size
-    before = size if counted is None else np.count_nonzero(counted)
-    return bool((size if counts is None else np.count_nonzero(counts)) > MOST * before)
+    problem, fit = tried.problem, tried.best.fit
+    late = max(fit.delay, problem.begins or 0)
+    return tried.related and not spans_record(fit) and bool(late < MOST * problem.y.size)
 
 
 def _chance(u: Real, y: Real) -> float:
-    """Chance that what does not follow the input resembles it as much."""
+    """Chance that what does not follow the input resembles it as much.
+
+    Of the record as it is, or after a window: what is left of the record's beginning hides a
+    response from the one, little of it in the middle of the record from the other. After Hann's
+    window every other bin is independent, and those are the bins of the record folded in two.
+    """
     lag = likeness(u, y, u.size // 2 - 1).lag
-    return misfit(u, y, delay=float(lag), band=excited_band(u, 1.0)).probability
+    band, half = excited_band(u, 1.0), u.size // 2
+    window = np.hanning(u.size)
+    late = np.concatenate([np.zeros(lag), (u - u.mean())[: u.size - lag]])
+    pair = window * late, window * (y - y.mean())
+    folded = [one[:half] + one[half : 2 * half] for one in pair]
+    asked = misfit(u, y, delay=float(lag), band=band), misfit(*folded, delay=0.0, band=band)
+    return len(asked) * min(one.probability for one in asked)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

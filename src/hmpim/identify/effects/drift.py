@@ -27,10 +27,10 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import PART, TWICE
+from hmpim.identify.worth import MOST, PART, TWICE
 from hmpim.record import Finding
 
-__all__ = ["Drifting", "drift_finding", "with_drift", "with_plain_drift"]
+__all__ = ["Drifting", "drift_finding", "is_slow", "with_drift", "with_plain_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
@@ -117,37 +117,42 @@ def with_drift(
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, fitted: Callable[[Real], JointFit]
+    problem: Problem, fit: Fit, fitted: Callable[[Real, bool], JointFit]
 ) -> Drifting | None:
-    """Add a drift to plain dynamics if their residual is slow; keep it if white noise is left.
+    """Add a drift to plain dynamics; keep it if white noise is left.
 
     Parameters
     ----------
     problem, fit
         The data, and the best plain fit with a constant bias.
     fitted : callable
-        Makes the joint fit of the plain structures with rows for the drift.
+        Makes the joint fit of the plain structures with rows for the drift; if the second argument
+        is true, whether it leaves white noise is all that is asked.
 
     Returns
     -------
     Drifting or None
-        None where a constant bias serves, where the model itself is slow, and where more than
-        white noise is left.
+        None where a constant bias serves, where the model that it is added to is slow itself, and
+        where more than white noise is left.
     """
-    if spans_record(fit) or not _is_slow(problem, fit):
-        return None
     columns = _polynomials(problem.y.size, _DEGREES[-1])
-    joint = fitted(columns)
-    if not is_white(joint.best.fit.residual):
+    joint = fitted(columns, True)
+    told = joint.problem.counted
+    if told < max(_FEWEST, MOST * problem.counted) or not is_white(joint.best.fit.residual):
         return None
     columns = _shape(joint, columns)
-    joint = fitted(columns)
+    joint = fitted(columns, False)
     if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
         return None
     gain = gain_by_rows(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
     return _described(joint, columns, rival=fit if gain < 2 * LIKELIER else None)
+
+
+def is_slow(problem: Problem, fit: Fit) -> bool:
+    """Whether what a fit leaves over is slow, and its model is not."""
+    return not spans_record(fit) and _is_slow(problem, fit)
 
 
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
