@@ -223,10 +223,8 @@ def _plain_beside_drift(
 ) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, where they leave white noise.
 
-    `first` is the plain fit to the input that leads, `asked`, as if it were the only one.
+    `first` is the plain fit to the input that leads, `asked`.
     """
-    if first.best.fit.is_white:
-        return None
     plain, count = OutputFit(fits=(first,)), 0
 
     def with_rows(rows: Real, briefly: bool) -> JointFit:

@@ -130,8 +130,9 @@ def fit_together(
     aside : mapping of int to JointFit
         Inputs that are not asked, each with its fit, which is not related.
     drifts : callable, optional
-        Fits plain dynamics with a drift, given the input that leads and its plain fit: others may
-        take a drift for their own. What it returns is taken, unless it is None.
+        Fits plain dynamics with a drift, given the input that leads and its plain fit, where what
+        is strong leaves more than white noise: richer dynamics may take a drift for their own.
+        What it returns is taken, unless it is None.
     briefly : bool
         Whether plain dynamics of what is strong are all that is fitted; the input that leads is
         then all that is returned.
@@ -143,14 +144,14 @@ def fit_together(
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
     _lead(inputs, pairs, plainly)
-    if drifts is not None:
-        drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
-        if drifting is not None:
-            return drifting
     _join(inputs, pairs, plainly)
     if briefly:
         pairs.refine(pairs.kept, None)
         return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
+    if drifts is not None and whitening_of(pairs.left()) is not None:
+        drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
+        if drifting is not None:
+            return drifting
     asked = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
