@@ -1,6 +1,7 @@
 """Identification from statistics: the same figures as from the samples, and honest bars."""
 
 import functools
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -38,6 +39,28 @@ def chirped(seed, size=2000, *, model=MODEL, colour=0.0, intersample="bandlimite
     if colour:
         y = y + lfilter([1.0], [1.0, -colour], 0.03 * rng.standard_normal(size))
     return Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample=intersample, band=(0.1, 20))
+
+
+def test_memory_does_not_grow_with_the_samples():
+    rng = np.random.default_rng(0)
+    statistics, state, block = None, np.zeros(1), 100_000
+    peaks = []
+    for blocks in (1, 19):
+        for _ in range(blocks):
+            u = np.repeat(rng.choice([-1.0, 1.0], block // 20), 20)
+            y, state = lfilter([0.1], [1.0, -0.9], u, zi=state)
+            y = y + 0.1 * rng.standard_normal(block)
+            if statistics is None:
+                record = Record.from_arrays({"u": u}, {"y": y}, fs=FS, intersample="zoh")
+                statistics = compress(record, lags=300)
+                identify(statistics)  # what is kept once for all is in place
+            else:
+                statistics.update(u, y)
+        tracemalloc.start()
+        identify(statistics)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 1e6  # one array of two million samples takes 16 MB
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.9])

@@ -21,7 +21,7 @@ from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly
 from hmpim.identify.fitting.rows import Part, Problem, spans
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import effective_share, is_steady, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SAMPLES_ALONE
@@ -125,6 +125,11 @@ class Fit:
     def is_white(self) -> bool:
         """Whether the residual passes for white."""
         return is_white(self.residual)
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the residual keeps its level, as far as its squares say."""
+        return is_steady(self.residual)
 
     @property
     def share(self) -> float:

@@ -20,7 +20,6 @@ from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.trial import Trial
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.covariance import covariance
-from hmpim.identify.noise.whiteness import is_steady
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
@@ -58,7 +57,7 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     As they come where that still follows the input: it is no noise, and whitening it would hide
     what a model lacks.
     """
-    if (fit.is_white and is_steady(fit.residual)) or follows(data, fit):
+    if (fit.is_white and fit.is_steady) or follows(data, fit):
         return data.plain
     noise = np.ones(1) if fit.is_white else data.noise_left(problem, fit)
     level = data.level_left(problem, fit, noise)

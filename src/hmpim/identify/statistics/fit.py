@@ -259,6 +259,11 @@ class Fitted(Fit):
         return self.left.noise.size == 1
 
     @property
+    def is_steady(self) -> bool:
+        """Whether what is left over keeps its level: without samples nothing speaks against it."""
+        return True
+
+    @property
     def share(self) -> float:
         """Independent samples per sample of what is left over."""
         return self.left.share
