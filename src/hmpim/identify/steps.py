@@ -23,6 +23,7 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
+from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,
@@ -144,7 +145,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
         course = continued(course, valid=valid, nuisance=rows)
         return chosen_of(course, question.plain)
 
-    if not is_slow(former.problem, former.best):
+    if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
     drifting = with_plain_drift(former.problem, former.best, with_rows)
     if drifting is None or not drifting.joint.related:
@@ -168,9 +169,9 @@ def _fit_and_look_for_rows(
         return fitted
     if several and question.intersample == "sampled":
         return fitted
-    slow = fitted.slow if several else None
     asked = 0
     if several:
+        slow = fitted.slow
         asked = fitted.leading if slow is None else slow
     joint, beside, humming = fitted.fits[asked], fitted, None
     hum = np.zeros(0)
@@ -225,11 +226,11 @@ def _plain_beside_drift(
 
     `first` is the plain fit to the input that leads, `asked`.
     """
-    plain, count = OutputFit(fits=(first,)), 0
+    plain = OutputFit(fits=(first,))
 
     def with_rows(rows: Real, briefly: bool) -> JointFit:
-        nonlocal plain, count
-        plain, count = _fit_once(question, seen, question.plain, rows, briefly=briefly), len(rows)
+        nonlocal plain
+        plain = _fit_once(question, seen, question.plain, rows, briefly=briefly)
         return plain.fits[0 if briefly else asked]
 
     drifting = with_plain_drift(first.problem, first.best.fit, with_rows)
@@ -239,6 +240,7 @@ def _plain_beside_drift(
     former = steady.fits[asked]
     if former.best.fit.is_white and steady.slow is None:
         return None
+    count = plain.fits[asked].best.fit.nuisance.size
     if gain_by_rows(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
         return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)

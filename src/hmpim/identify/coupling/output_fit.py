@@ -211,7 +211,7 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
 
 def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit, in place, the input that the output follows most."""
-    level = pairs.y if pairs.valid is None else bridged(pairs.y, pairs.valid)
+    level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in _likely(share)}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
@@ -251,9 +251,7 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found = {}
     for j in waiting:
-        rest = pairs.without_others(j) - constant
-        if counted is not None:
-            rest = bridged(rest, counted)
+        rest = bridged(pairs.without_others(j) - constant, counted)
         share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
         if share > PART and _chance(inputs[j], rest) < FALSE_ALARM / len(waiting):
             found[j] = share

@@ -87,7 +87,7 @@ def coupling_fit(
     is returned is without it. The input has shape (n,); what it does between its samples is as
     found for the strongest input.
     """
-    y = problem.y if problem.valid is None else bridged(problem.y, problem.valid)
+    y = bridged(problem.y, problem.valid)
     # Both whitened alike: the ratio stays, and noise at low frequencies hides no delay.
     plain = replace(problem, valid=None)
     rough = rough_response(

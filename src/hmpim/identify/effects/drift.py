@@ -150,11 +150,6 @@ def with_plain_drift(
     return _described(joint, columns, rival=fit if gain < 2 * LIKELIER else None)
 
 
-def is_slow(problem: Problem, fit: Fit) -> bool:
-    """Whether what a fit leaves over is slow, and its model is not."""
-    return not spans_record(fit) and _is_slow(problem, fit)
-
-
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
     """Whether a rich model has a pole as slow as the record where plain dynamics and a drift do.
 
@@ -190,10 +185,10 @@ def _asked_for(joint: JointFit) -> bool:
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
-    return fit.cost > PART * float(spread @ spread) or _is_slow(problem, fit)
+    return fit.cost > PART * float(spread @ spread) or is_slow(problem, fit)
 
 
-def _is_slow(problem: Problem, fit: Fit) -> bool:
+def is_slow(problem: Problem, fit: Fit) -> bool:
     """Whether what a fit leaves over is slow."""
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]

@@ -371,7 +371,7 @@ def _level(
 ) -> NDArray[np.float64]:
     """An output for spectra: without what its rows explain, gaps filled."""
     level = y if nuisance is None else y - _regressed(nuisance, y, valid)
-    return level if valid is None else bridged(level, valid)
+    return bridged(level, valid)
 
 
 def _regressed(
@@ -384,8 +384,10 @@ def _regressed(
     return np.asarray(weights @ rows)
 
 
-def bridged(y: NDArray[np.float64], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Fill samples that do not count by straight lines, for spectra."""
+def bridged(y: NDArray[np.float64], valid: NDArray[np.bool_] | None) -> NDArray[np.float64]:
+    """Fill samples that do not count by straight lines, for spectra; all do if None."""
+    if valid is None:
+        return y
     index = np.arange(y.size)
     return np.interp(index, index[valid], y[valid])
 
