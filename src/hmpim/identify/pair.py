@@ -9,7 +9,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import response_through
 from hmpim.identify.coupling.output_fit import OutputFit
-from hmpim.identify.coupling.responses import Responses, responses_of, settled, unrelated
+from hmpim.identify.coupling.responses import Responses, responses_of, settled, unfound, unrelated
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import Drifting, drift_finding
 from hmpim.identify.effects.gain import GainChange
@@ -74,6 +74,8 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
             pair = _pair(question, seen, fitted, i, responses)
+            more = unfound(fitted, responses, inputs)
+            pair = replace(pair, warnings=(*pair.warnings, *more))
             pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
         else:
             finding = unrelated(output.name, source.name, responses.columns[i])
@@ -126,8 +128,18 @@ def _pair(
     moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
     course = None if joined.gaining is None or not joined.gaining.taken else joined.gaining.course
-    evidence, unmade = _evidence(question, found, readings, joint, response, i, moves, joined)
-    evidence = replace(evidence, nonlinear=max(bent, evidence.nonlinear))
+    from_response, unread = attempt(
+        "response_bandwidths",
+        lambda: _bandwidths(question, joint, readings, response, i, matrix),
+        ResponseBandwidths(),
+    )
+    left, untested = attempt(
+        "misfit", lambda: _left(question, joint, i, matrix), Misfit(share=0.0, probability=1.0)
+    )
+    evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
+    evidence = replace(
+        evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
+    )
     parameters, seen = with_imperfections(evidence.spanned, found, censored, output.unit)
     known = {finding.code for finding in seen}
     findings = (
@@ -138,7 +150,7 @@ def _pair(
         *(finding for finding in said if finding.code not in known),
         *(() if drifting is None else (drift_finding(drifting, aligned.fs, output.unit),)),
         *(() if humming is None else (hum_finding(humming, aligned.fs, output.unit),)),
-        *(*unseen, *unmoved, *unmade),
+        *(*unseen, *unmoved, *unread, *untested),
     )
     fit = joint.best.fit
     numerator, denominator = coefficients_of(readings.system)
@@ -166,27 +178,16 @@ def _pair(
 
 def _evidence(
     question: Question,
-    found: Imperfections,
     readings: Readings,
     joint: JointFit,
-    response: FrequencyResponse,
+    from_response: ResponseBandwidths,
+    left: Misfit,
     i: int,
     moves: tuple[Bend, ...],
     joined: OutputFit,
-) -> tuple[Evidence, tuple[Finding, ...]]:
-    """What the checks look at, and what of it could not be made."""
+) -> Evidence:
+    """What the checks look at."""
     fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
-    u = question.aligned.inputs[i].values
-    from_response, unread = attempt(
-        "response_bandwidths",
-        lambda: _bandwidths(question, joint, readings, response, i),
-        ResponseBandwidths(),
-    )
-    left, untested = attempt(
-        "misfit",
-        lambda: misfit(u, fit.residual, delay=fit.delay, band=(band[0] / fs, band[1] / fs)),
-        Misfit(share=0.0, probability=1.0),
-    )
     # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
     gaining = joined.gaining if fit is joined.fits[i].best.fit else None
     evidence = Evidence(
@@ -194,13 +195,12 @@ def _evidence(
         readings=readings,
         spanned=readings.parameters,
         misfit=left,
-        u=u,
+        u=question.aligned.inputs[i].values,
         fs=fs,
         band=band,
         fit_percent=_fit_percents(joint, [fit.cost])[0],
         bends=moves,
         nonlinear=max((one.share for one in moves if one.certain), default=0.0),
-        held=found.hold is not None,
         measured=from_response,
         through=question.instrument is not None,
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
@@ -220,7 +220,16 @@ def _evidence(
         whole = blurred(whole, WORTH)
     if evidence.is_without_noise and not fit.structure.sampled:
         whole = without_noise(whole)
-    return replace(evidence, spanned=whole), (*unread, *untested)
+    return replace(evidence, spanned=whole)
+
+
+def _left(question: Question, joint: JointFit, i: int, matrix: Responses | None) -> Misfit:
+    """How much of the residual still follows the input."""
+    if matrix is not None:
+        return matrix.left[i]
+    fs, (low, high), fit = question.aligned.fs, question.band(i), joint.best.fit
+    u = question.aligned.inputs[i].values
+    return misfit(u, fit.residual, delay=fit.delay, band=(low / fs, high / fs))
 
 
 def _other_explanations(gaining: GainChange | None, drifting: Drifting | None) -> list[Fit]:
@@ -232,7 +241,12 @@ def _other_explanations(gaining: GainChange | None, drifting: Drifting | None) -
 
 
 def _bandwidths(
-    question: Question, joint: JointFit, readings: Readings, response: FrequencyResponse, i: int
+    question: Question,
+    joint: JointFit,
+    readings: Readings,
+    response: FrequencyResponse,
+    i: int,
+    matrix: Responses | None,
 ) -> ResponseBandwidths:
     """Bandwidths by the measured response; if apart from the model's, less the estimator's bias.
 
@@ -251,12 +265,14 @@ def _bandwidths(
         )
 
     found = read(response)
-    alone = question.inputs is None and question.instrument is None
-    if not alone or not disagreeing(found, readings.parameters):
+    if question.instrument is not None or not disagreeing(found, readings.parameters):
         return found
-    u = question.aligned.inputs[i].values
-    own = read(_local(u, fit.prediction, fit, fs, question.band(i)))
-    return less_bias(found, own, readings.parameters)
+    if matrix is None:
+        u = question.aligned.inputs[i].values
+        own = _local(u, fit.prediction, fit, fs, question.band(i))
+    else:
+        own = matrix.of_models().columns[i]
+    return less_bias(found, read(own), readings.parameters)
 
 
 def _refined(

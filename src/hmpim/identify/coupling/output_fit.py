@@ -19,6 +19,7 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import covariances, derivatives, own_lag
+from hmpim.identify.coupling.left import misfit_at_any_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
@@ -30,9 +31,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.section_iv.correlation import likeness
-from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
@@ -156,7 +155,7 @@ def fit_together(
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
         before = pairs.structures
-        _fit_strong(inputs, pairs, partial(fitted, structures=structures))
+        _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
         left = pairs.cost
         pairs.refine(pairs.kept, None)
         clearer = pairs.cost * TWICE < asked
@@ -170,6 +169,9 @@ def fit_together(
         simpler = pairs.simplify()
         if not others and not simpler and pairs.cost * TWICE > left:
             break  # else each was fitted to the wrong rest
+    if pairs.reopen():
+        _fit_strong(inputs, pairs, partial(fitted, structures=structures))
+        pairs.refine(pairs.kept, None)
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
@@ -253,7 +255,7 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
         share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
-        if share > PART and _chance(inputs[j], rest) < FALSE_ALARM / len(waiting):
+        if share > PART and misfit_at_any_lag(inputs[j], rest).probability < FALSE_ALARM / len(waiting):
             found[j] = share
     return found
 
@@ -284,23 +286,6 @@ def _is_followed(tried: JointFit) -> bool:
     problem, fit = tried.problem, tried.best.fit
     late = max(fit.delay, problem.begins or 0)
     return tried.related and not spans_record(fit) and bool(late < MOST * problem.y.size)
-
-
-def _chance(u: Real, y: Real) -> float:
-    """Chance that what does not follow the input resembles it as much.
-
-    Of the record as it is, or after a window: what is left of the record's beginning hides a
-    response from the one, little of it in the middle of the record from the other. After Hann's
-    window every other bin is independent, and those are the bins of the record folded in two.
-    """
-    lag = likeness(u, y, u.size // 2 - 1).lag
-    band, half = excited_band(u, 1.0), u.size // 2
-    window = np.hanning(u.size)
-    late = np.concatenate([np.zeros(lag), (u - u.mean())[: u.size - lag]])
-    pair = window * late, window * (y - y.mean())
-    folded = [one[:half] + one[half : 2 * half] for one in pair]
-    asked = misfit(u, y, delay=float(lag), band=band), misfit(*folded, delay=0.0, band=band)
-    return len(asked) * min(one.probability for one in asked)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

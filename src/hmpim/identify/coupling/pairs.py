@@ -10,6 +10,7 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
+from hmpim.identify.fitting.growth import SURE
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, PART, TWICE
@@ -93,6 +94,20 @@ class Pairs:
         if counts is None or counted is None:
             return counts is counted and np.array_equal(before, rest)
         return np.array_equal(counts, counted) and np.array_equal(before, rest)
+
+    def reopen(self) -> bool:
+        """Forget what searches were made on, where one of many poles leaves more than noise.
+
+        Returns
+        -------
+        bool
+            Whether there is one.
+        """
+        best = [self.fits[i].best.fit for i in self.strong]
+        unsure = any(fit.structure.order > SURE and not fit.is_white for fit in best)
+        if unsure:
+            self._seen.clear()
+        return unsure
 
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which what some of the inputs do is known."""

@@ -1,18 +1,21 @@
 """Several inputs at once: which can be told apart, the response to each, and what is weak."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS
+from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.coupling.inputs import input_set
+from hmpim.identify.coupling.left import left_over
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.weak import unsettled
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result import (
     Alike,
     Estimate,
@@ -22,12 +25,13 @@ from hmpim.identify.result import (
     PairIdentification,
     Parameters,
 )
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import EVERY, MODELLED, in_words
 from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST, TWICE
 from hmpim.record import Aligned, Finding, Record, Signal
 
-__all__ = ["Responses", "inputs_of", "responses_of", "settled", "unrelated"]
+__all__ = ["Responses", "inputs_of", "responses_of", "settled", "unfound", "unrelated"]
 
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
@@ -41,6 +45,8 @@ class Responses:
     # partial one
     columns: tuple[FrequencyResponse, ...]
     coherence: OutputCoherence  # the multiple one
+    left: tuple[Misfit, ...]  # how far what all inputs leave over still follows each
+    of_models: Callable[[], "Responses"]  # the same of what the models predict, noise aside
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
@@ -122,6 +128,16 @@ def responses_of(
             frequency=_joined_up([m.frequency for _, m in pieces]),
             multiple=_joined_up([m.multiple_coherence[:, 0] for _, m in pieces]),
         ),
+        left=left_over(
+            [source.values for source in aligned.inputs],
+            joined.fits,
+            [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
+        ),
+        of_models=cache(
+            lambda: responses_of(
+                aligned, replace(output, values=joined.prediction), joined, inputs
+            )
+        ),
     )
 
 
@@ -183,6 +199,22 @@ def _bound(response: FrequencyResponse) -> tuple[float, float, float] | None:
     upper = np.abs(response.response) + _UPPER * response.std
     level = 20 * float(np.log10(max(float(np.quantile(upper, 0.9)), 1e-300)))
     return level, float(response.frequency[0]), float(response.frequency[-1])
+
+
+def unfound(joined: OutputFit, matrix: Responses, inputs: InputSet) -> tuple[Finding, ...]:
+    """Doubt the noise where what is left over follows an input whose response was not found."""
+    return tuple(
+        Finding(
+            code="unfound_response",
+            message=f"The residual still follows input {name!r}, whose response was not found: it "
+            f"is about {percent(left.share)} % of what counts as noise. "
+            f"Excite {name!r} more, or alone.",
+            severity="doubt",
+            parameters=("noise_std",),
+        )
+        for name, fit, left in zip(inputs.names, joined.fits, matrix.left, strict=True)
+        if not fit.related and left.probability < FALSE_ALARM and left.share > 2 * FEW
+    )
 
 
 def settled(

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.enrich import (
     without_fast,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import one_more_pole, scale_of, with_pole
+from hmpim.identify.fitting.growth import SURE, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.rows import STAMPED_LATE
@@ -52,9 +52,6 @@ _LONG_TASTE = 12
 
 _PARTNER = 0.3
 """Time constant of a pole that is added, over the fit's own."""
-
-_SURE = 4
-"""Poles up to which a structure may leave more than white noise."""
 
 _AT_ONCE = 4
 """Richer structures tried before it is asked whether more are needed."""
@@ -160,17 +157,23 @@ def fit_rich(
     structures: tuple[StructureName, ...],
     *,
     all_of_them: bool,
+    shared: bool,
 ) -> list[Fit]:
     """Fits of the richer structures, the most promising first, until nothing is left to explain.
 
-    And those that are a richer one without what the record does not need of it.
+    And those that are a richer one without what the record does not need of it. Where the output is
+    `shared` with inputs that are not fitted to their end, many poles need not leave white noise,
+    but half the power.
     """
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
     found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
     if found and not min(found, key=lambda fit: fit.objective).is_white:
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
-        found = [f for f in found if f.structure.order <= _SURE and not spans_record(f)]
+        few = [f for f in found if f.structure.order <= SURE]
+        enough = min((f.objective for f in [*fits, *few]), default=np.inf) / TWICE
+        many = [f for f in found if shared and f not in few and f.objective < enough]
+        found = [f for f in [*few, *many] if not spans_record(f)]
         if min(fits, key=lambda fit: fit.objective).is_white:
             # In a loop, noise returns through the input and looks like dynamics.
             found = [f for f in found if f.is_white]

@@ -78,6 +78,8 @@ class Course:
         Of the plain structures.
     settled : Fit or None
         The best of them where it leaves white noise and the record begins at rest: it is polished.
+    shared : bool
+        Whether inputs that are not fitted to their end move the output too.
     """
 
     data: Data
@@ -90,6 +92,7 @@ class Course:
     counted: Seen
     fits: list[Fit]
     settled: Fit | None = None
+    shared: bool = False
 
     @property
     def problem(self) -> Problem:
@@ -344,7 +347,14 @@ def enrich(
     if not asked and owed <= WORTH:
         return course, fitted
     fits = course.fits
-    richer = fit_rich(data, course.problem, fits, course.others, all_of_them=not plain)
+    richer = fit_rich(
+        data,
+        course.problem,
+        fits,
+        course.others,
+        all_of_them=not plain,
+        shared=course.shared,
+    )
     if not asked and not any(fit.is_white for fit in richer):
         return course, fitted
     if richer and course.counted.begins is not None:

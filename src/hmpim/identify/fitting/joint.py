@@ -64,6 +64,7 @@ def joint_fit(
     structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *MODES, *INTEGRATING),
     nuisance: NDArray[np.float64] | None = None,
     growing: bool = True,
+    shared: bool = False,
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -85,6 +86,9 @@ def joint_fit(
         Rows beside the bias that enter linearly, such as a drift's.
     growing : bool
         Whether it is asked for one more pole at the end, and what that leaves open.
+    shared : bool
+        Whether inputs that are not fitted to their end move the output too: many poles need not
+        leave white noise then.
 
     Returns
     -------
@@ -93,6 +97,7 @@ def joint_fit(
     if intersample == "sampled":
         return software_fit(u, y, valid=valid, structures=structures, nuisance=nuisance)
     course = start(u, y, valid, known, intersample, structures, nuisance)
+    course = replace(course, shared=shared)
     course = turn_ahead(course)
     course = free_from_wander(course)
     course = interpolate_finely(course)
