@@ -9,9 +9,16 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.asked.question import Question
 from hmpim.identify.asked.reference import response_through
 from hmpim.identify.coupling.output_fit import OutputFit
-from hmpim.identify.coupling.responses import Responses, responses_of, settled, unfound, unrelated
+from hmpim.identify.coupling.responses import (
+    Responses,
+    responses_of,
+    settled,
+    unfound,
+    unrelated,
+    with_noise_doubted,
+)
 from hmpim.identify.effects.censored import CensoredFit
-from hmpim.identify.effects.drift import Drifting, drift_finding
+from hmpim.identify.effects.drift import Drifting, drift_findings
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
@@ -80,7 +87,7 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
         else:
             finding = unrelated(output.name, source.name, responses.columns[i])
             pairs.append(_untold(question, i, finding, responses.columns[i]))
-    return Described(pairs=tuple(pairs), coherence=responses.coherence)
+    return Described(pairs=with_noise_doubted(pairs, fitted), coherence=responses.coherence)
 
 
 def describe_dead(question: Question) -> Described:
@@ -148,7 +155,7 @@ def _pair(
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *(() if drifting is None else (drift_finding(drifting, aligned.fs, output.unit),)),
+        *_drifts(drifting, readings, aligned.fs, output.unit),
         *(() if humming is None else (hum_finding(humming, aligned.fs, output.unit),)),
         *(*unseen, *unmoved, *unread, *untested),
     )
@@ -174,6 +181,13 @@ def _pair(
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else inspection.summary,
     )
+
+
+def _drifts(
+    drifting: Drifting | None, readings: Readings, fs: float, unit: str
+) -> tuple[Finding, ...]:
+    """What is said of a drift; nothing where there is none."""
+    return () if drifting is None else drift_findings(drifting, fs, unit, white=readings.white)
 
 
 def _evidence(

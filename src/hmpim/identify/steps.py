@@ -284,7 +284,7 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     seen = _without_clusters(question, seen, fitted)
     residual = first.best.fit.residual
     asked = seen.saturation is not None or seen.hold is not None
-    if not asked and is_white(residual) and not stands_out(residual):
+    if not asked and is_white(residual) and not stands_out(first.problem.counting(residual)):
         return seen
     prediction = fitted.prediction.copy()  # of what came before the free response it says nothing
     prediction[: first.forgotten] = question.output.values[: first.forgotten]

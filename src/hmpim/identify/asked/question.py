@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.asked.reference import Instrument
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import joint_fit
@@ -16,7 +16,7 @@ from hmpim.identify.fitting.software import is_exact, software_fit
 from hmpim.identify.nonlinear.speed import LimitedCommand
 from hmpim.identify.result import InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import ROUNDING
+from hmpim.identify.worth import ROUNDING, TWICE
 from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Finding, Intersample, Record, Signal
 from hmpim.record.slower import restored
@@ -75,7 +75,24 @@ def _known(source: Signal) -> Mask:
     before = np.maximum.accumulate(np.where(source.valid, place, 0))
     after = np.minimum.accumulate(np.where(source.valid, place, place[-1])[::-1])[::-1]
     stands = source.values[before] == source.values[after]
+    stands &= after - before - 1 < _shortest_stay(source.values, source.valid)
     return np.asarray(source.valid | stands | restored(source.values, source.valid)[1])
+
+
+def _shortest_stay(u: Real, valid: Mask) -> float:
+    """Samples for which an input stays at a level at least, before it goes to one it had before.
+
+    A shorter gap between two equal values hides no motion. Infinite where levels do not recur.
+    """
+    told = u[valid]
+    stays = 1 + np.count_nonzero(np.diff(told))
+    if stays <= TWICE * np.unique(told).size:
+        return np.inf
+    edges = np.flatnonzero(np.diff(u) != 0.0) + 1
+    lost = np.concatenate([[0], np.cumsum(~valid)])
+    whole = lost[edges[1:] + 1] == lost[edges[:-1] - 1]  # from the sample before to that after
+    lengths = np.diff(edges)[whole]
+    return float(lengths.min()) if lengths.size else 1.0
 
 
 def recognise_software(question: Question) -> Question:

@@ -79,8 +79,12 @@ class Pairs:
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def put(self, i: int, fit: JointFit) -> None:
-        """Take a fit of one input to what the others leave over, and the samples it counts."""
-        self.fits[i], self.masks[i] = fit, fit.problem.valid
+        """Take a fit of one input to what the others leave over, and the samples it counts.
+
+        What does not follow an input is known wherever the output is.
+        """
+        self.fits[i] = fit
+        self.masks[i] = fit.problem.valid if fit.related else None
 
     def settle(self, i: int, rest: Real, counted: Mask | None) -> None:
         """Note what the whole search for one input was made on."""
@@ -119,9 +123,10 @@ class Pairs:
 
     def left(self) -> Real:
         """What all of them leave over."""
-        best = self.fits[self.strong[0]]
+        kept = self.kept
+        best = self.fits[next((i for i in self.strong if i in kept), self.strong[0])]
         rest = self.without(self.fits) - constant_of(best)
-        counts = best.problem.valid
+        counts = self.counted(kept)
         return rest if counts is None else np.asarray(rest * counts)
 
     def refine(

@@ -1,6 +1,6 @@
 """Several inputs at once: which can be told apart, the response to each, and what is weak."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
 from itertools import pairwise
@@ -31,10 +31,22 @@ from hmpim.identify.result.groups import EVERY, MODELLED, in_words
 from hmpim.identify.worth import FEW, MOST, MUCH, NEARLY, PART, PAST, TWICE
 from hmpim.record import Aligned, Finding, Record, Signal
 
-__all__ = ["Responses", "inputs_of", "responses_of", "settled", "unfound", "unrelated"]
+__all__ = [
+    "Responses",
+    "inputs_of",
+    "responses_of",
+    "settled",
+    "unfound",
+    "unrelated",
+    "with_noise_doubted",
+]
 
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
+
+
+_OF_THE_RESIDUAL = frozenset({"lack_of_fit", "unsampled_input", "uneven_noise"})
+"""Codes of doubts by which what is left over is no noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -215,6 +227,37 @@ def unfound(joined: OutputFit, matrix: Responses, inputs: InputSet) -> tuple[Fin
         for name, fit, left in zip(inputs.names, joined.fits, matrix.left, strict=True)
         if not fit.related and left.probability < FALSE_ALARM and left.share > 2 * FEW
     )
+
+
+def with_noise_doubted(
+    pairs: Sequence[PairIdentification], joined: OutputFit
+) -> tuple[PairIdentification, ...]:
+    """Doubt the noise of each pair of an output where that of another is doubted.
+
+    All inputs leave one residual: what is no noise beside one of them is none beside the others.
+    """
+    found = []
+    for pair, fit in zip(pairs, joined.fits, strict=True):
+        known = {finding.code for finding in pair.warnings}
+        others = (other for other in pairs if other is not pair)
+        shared = {f.code: (o.input, f) for o in others for f in o.warnings if _of_the_noise(f)}
+        more = tuple(
+            replace(
+                finding,
+                message=f"Beside input {source!r}: {finding.message}",
+                parameters=("noise_std",),
+            )
+            for code, (source, finding) in shared.items()
+            if fit.related and code not in known
+        )
+        found.append(replace(pair, warnings=(*pair.warnings, *more)) if more else pair)
+    return tuple(found)
+
+
+def _of_the_noise(finding: Finding) -> bool:
+    """Whether a finding says that the residual is no noise."""
+    doubted = finding.severity == "doubt" and "noise_std" in finding.parameters
+    return doubted and finding.code in _OF_THE_RESIDUAL
 
 
 def settled(

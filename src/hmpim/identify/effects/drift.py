@@ -30,7 +30,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import MOST, PART, TWICE
 from hmpim.record import Finding
 
-__all__ = ["Drifting", "drift_finding", "is_slow", "with_drift", "with_plain_drift"]
+__all__ = ["Drifting", "drift_findings", "is_slow", "with_drift", "with_plain_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
@@ -103,11 +103,22 @@ def with_drift(
         return first, None
     columns = _polynomials(first.problem.y.size, _DEGREES[-1])
     joint = fitted(columns, True)
+    plainly = is_white(joint.best.fit.residual)
+    if not plainly:  # of what a model lacks the drift takes no shape
+        joint = fitted(columns, False)
     columns = _shape(joint, columns)
+
+    def gained(joint: JointFit) -> tuple[float, float]:
+        least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
+        return gain_by_rows(joint, len(columns), first.best.fit, first.problem), least
+
+    gain, least = gained(joint)  # fewer rows explain no more
+    if gain < least:
+        return first, None
     # The structure is chosen once more, now that the drift is known.
-    joint = fitted(columns, is_white(joint.best.fit.residual))
-    gain = gain_by_rows(joint, len(columns), first.best.fit, first.problem)
-    if gain < (-2 * CLEARLY if _passes_for_drift(first, joint) else 0.0):
+    joint = fitted(columns, plainly)
+    gain, least = gained(joint)
+    if gain < least:
         return first, None
     steady, rows = steadily(joint), len(columns)
     if steady and gain_by_rows(joint, rows, steady.best.fit, steady.problem) < 0.0:
@@ -161,13 +172,15 @@ def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
     return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
 
-def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
-    """Say how the bias drifts."""
+def drift_findings(
+    drifting: Drifting, fs: float, unit: str, *, white: bool
+) -> tuple[Finding, ...]:
+    """Say how the bias drifts, and doubt the noise where what is left is not `white`."""
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
     span = f"{float(np.ptp(drifting.trend)):.3g} {unit}".rstrip()
     shape = "steadily" if drifting.steady else "unsteadily"
-    return Finding(
+    drifts = Finding(
         code="drift",
         message=f"The bias drifts {shape}, by {span} over the record, on average by "
         f"{rate:.3g} ± {std:.2g}{per}; the drift is removed, and the bias stated is the mean "
@@ -175,6 +188,16 @@ def drift_finding(drifting: Drifting, fs: float, unit: str) -> Finding:
         severity="info",
         parameters=("bias",),
     )
+    if white:
+        return (drifts,)
+    unsure = Finding(
+        code="drift_or_noise",
+        message="The residual is not white once the drift is removed: what is slow in it may be "
+        "drift too, and is no noise then. Let the unit warm up, and repeat the test.",
+        severity="doubt",
+        parameters=("noise_std",),
+    )
+    return drifts, unsure
 
 
 def _asked_for(joint: JointFit) -> bool:

@@ -130,7 +130,7 @@ def find_imperfections(
         quantization=rounding,
         spikes=spikes,
         frozen=frozen,
-        repeated=find_repeated(y) if rounding is None and hold is None else None,
+        repeated=find_repeated(y, valid) if rounding is None and hold is None else None,
         levels=_few_levels(y, inputs),
     )
 

@@ -160,12 +160,13 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
     return np.arange(y.size) >= first
 
 
-def find_repeated(y: Real) -> Mask | None:
+def find_repeated(y: Real, valid: Mask | None = None) -> Mask | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
     A frame that was lost is often filled by the one before it. An output that is rounded, held or
     at rest repeats itself too, but not for a sample or two now and then. Two alike at the highest
     or lowest value may be clipped: alone they tell of no lost frame, beside others they are one.
+    Where frames repeat, the first sample after one that is not `valid` may be a copy of that.
 
     Examples
     --------
@@ -185,4 +186,8 @@ def find_repeated(y: Real) -> Mask | None:
             copies[a:b] = False
         elif y[a] not in extreme:
             inside += b - a
-    return copies if inside >= max(3, WORTH * y.size) else None
+    if inside < max(3, WORTH * y.size):
+        return None
+    if valid is not None:
+        copies[1:] |= valid[1:] & ~valid[:-1]
+    return copies

@@ -239,9 +239,15 @@ def fit_integrating(
 
 
 def sums_to_noise(fits: list[Fit]) -> bool:
-    """Whether the best fit with an integrator leaves white noise."""
+    """Whether the best fit with an integrator leaves white noise, and no more than others do.
+
+    Of a white output, one that explains nothing leaves white noise too.
+    """
     integrating = [fit for fit in fits if fit.structure.integrators]
-    return bool(integrating) and min(integrating, key=lambda fit: fit.objective).is_white
+    if not integrating:
+        return False
+    best = min(integrating, key=lambda fit: fit.objective)
+    return best.objective < TWICE * min(fit.objective for fit in fits) and best.is_white
 
 
 def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
@@ -454,13 +460,15 @@ def fit_under_each_assumption(
     best = min(fits, key=lambda fit: fit.objective)
     least, count = best.objective, data.problem(natural, seen).counted * best.share
     clearly = float(np.expm1(2 * CLEARLY / count)) * least
-    leading, trailing = [], []
+    leading, trailing, plainer = [], [], []
     for fit in fits:
         plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
         if hopeful and (plain or fit.objective < least + clearly):
             leading.append(fit)
         elif hopeful or plain:
             trailing.append(fit)
+        elif fit.structure.parameters < best.structure.parameters:
+            plainer.append(fit)
     others = [mode for mode in BETWEEN if mode != natural]
     hopeless = TWICE * least
 
@@ -472,6 +480,10 @@ def fit_under_each_assumption(
         ]
 
     fitted += moved(leading)
-    if min(fit.objective for _, fit in fitted) < least - clearly:
+    better = min(fit.objective for _, fit in fitted) < least - clearly
+    rich = best.structure.name not in PLAIN
+    if better or rich:
         fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
+    if rich:
+        fitted += moved(plainer)  # poles and zeros may have made up for a wrong assumption
     return fitted

@@ -139,7 +139,7 @@ def _leading_integrators(course: Course) -> list[Fit]:
     if not is_poor(course.best, course.problem.spread):
         return []
     found = fit_integrating(course.data, course.problem, course.fits, course.others)
-    return found if sums_to_noise(found) else []
+    return found if sums_to_noise([*course.fits, *found]) else []
 
 
 def begun(
