@@ -332,6 +332,7 @@ BESIDE = (
         "two inputs, drift", "The bias warms up", SECOND, SWEEP, BESIDE_ANOTHER, c.drift("thermal")
     ),
     family("two inputs, mains", "50 or 60 Hz hum", SECOND, SWEEP, BESIDE_ANOTHER, c.mains),
+    family("two inputs, modes", "Three or four modes", k.modes(3, 4), SWEEP, BESIDE_ANOTHER),
     family(
         "two inputs, missing",
         "One row in twenty is not there",
@@ -416,20 +417,27 @@ ANY_SPOIL = (  # in this order
 )  # fmt: skip
 
 
-def by_chance(rng: np.random.Generator) -> Draw:
+def by_chance(*always: c.Condition) -> Callable[[np.random.Generator], Draw]:
     """Any system under any input, with none, one or two conditions: no draw is like another."""
-    drive = ANY_INPUT[int(rng.integers(len(ANY_INPUT)))](rng)
-    system = ANY_SYSTEM[int(rng.integers(len(ANY_SYSTEM)))](rng, drive)
-    take = shoot(rng, system, drive, snr_db=float(rng.uniform(20, 70)))
-    some = rng.choice(len(ANY_SPOIL), int(rng.integers(3)), replace=False)
-    for place in sorted(some):
-        ANY_SPOIL[place](take)
-    return finish(take)
+
+    def draw(rng: np.random.Generator) -> Draw:
+        drive = ANY_INPUT[int(rng.integers(len(ANY_INPUT)))](rng)
+        system = ANY_SYSTEM[int(rng.integers(len(ANY_SYSTEM)))](rng, drive)
+        take = shoot(rng, system, drive, snr_db=float(rng.uniform(20, 70)))
+        for condition in always:
+            condition(take)
+        some = rng.choice(len(ANY_SPOIL), int(rng.integers(3)), replace=False)
+        for place in sorted(some):
+            ANY_SPOIL[place](take)
+        return finish(take)
+
+    return draw
 
 
 CHANCE = (
-    other("by chance", "Any system, any input, up to two conditions", by_chance),
-    other("by chance, more", "As many again", by_chance),
+    other("by chance", "Any system, any input, up to two conditions", by_chance()),
+    other("by chance, more", "As many again", by_chance()),
+    other("by chance, two inputs", "The same, and one more input", by_chance(BESIDE_ANOTHER)),
 )
 
 FAMILIES = {

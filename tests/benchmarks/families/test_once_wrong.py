@@ -32,6 +32,10 @@ from tests_support import in_studies
         ("two inputs, drift", 881, 35),  # a free response begins as a warm-up does
         ("two inputs, mid-sweep", 883, 38),  # a drift stands for what the record begins with
         ("two inputs, missing", 883, 9),  # few samples are known, and early ones
+        ("by chance", 1001, 24),  # a fifth pole stands for a linear input
+        ("by chance", 1001, 36),  # and zeros do
+        ("by chance, more", 1001, 56),  # what is left of a drift counts as noise
+        ("by chance", 1003, 22),  # a sequence went to and fro in a gap
         *in_studies(
             ("Bessel", 222, 0),  # a linear input stands in for a third pole
             ("Bessel", 404, 6),  # a sixth pole would not show, and takes of the delay
@@ -60,6 +64,18 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
     pair = identified(draw).pairs[0]
     assert pair.structure == "second_order_zero"
     assert pair.verdict == "ok"
+
+
+@pytest.mark.parametrize(
+    ("family", "seed", "index"),
+    [
+        ("by chance", 1003, 87),  # a slow pole stood for a drift beside a zero
+        ("by chance, more", 1003, 36),  # white noise was left by an integrator that explains nothing
+        ("two inputs, modes", 1, 0),  # many poles had to leave white noise beside another input
+    ],
+)
+def test_a_draw_that_was_doubted_and_wrong_is_right(family, seed, index):
+    assert one(family, seed, index, True).cell == "right_ok"
 
 
 def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():

@@ -101,12 +101,12 @@ def with_drift(
     """
     if not _asked_for(first):
         return first, None
-    columns = _polynomials(first.problem.y.size, _DEGREES[-1])
-    joint = fitted(columns, True)
+    every = _polynomials(first.problem.y.size, _DEGREES[-1])
+    joint = fitted(every, True)
     plainly = is_white(joint.best.fit.residual)
     if not plainly:  # of what a model lacks the drift takes no shape
-        joint = fitted(columns, False)
-    columns = _shape(joint, columns)
+        joint = fitted(every, False)
+    columns = _shape(joint, every)
 
     def gained(joint: JointFit) -> tuple[float, float]:
         least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
@@ -115,11 +115,11 @@ def with_drift(
     gain, least = gained(joint)  # fewer rows explain no more
     if gain < least:
         return first, None
-    # The structure is chosen once more, now that the drift is known.
-    joint = fitted(columns, plainly)
-    gain, least = gained(joint)
-    if gain < least:
-        return first, None
+    if len(columns) < len(every):  # the structure is chosen once more, now that the drift is known
+        joint = fitted(columns, plainly)
+        gain, least = gained(joint)
+        if gain < least:
+            return first, None
     steady, rows = steadily(joint), len(columns)
     if steady and gain_by_rows(joint, rows, steady.best.fit, steady.problem) < 0.0:
         return steady, None

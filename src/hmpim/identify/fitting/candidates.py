@@ -28,7 +28,7 @@ from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
 from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, PART, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import BETWEEN, Intersample
@@ -221,11 +221,14 @@ def fit_integrating(
 ) -> list[Fit]:
     """Fits of the structures that integrate, the plainest first, until one leaves white noise.
 
-    Those among `fits` are not fitted again.
+    Or explains next to nothing, of an output that does not wander. Those among `fits` are not
+    fitted again.
     """
     found: list[Fit] = []
     for structure in members(structures, INTEGRATING):
         if sums_to_noise([*fits, *found]):
+            break
+        if found and found[-1].cost > NEARLY * problem.spread:
             break
         if any(fit.structure == structure for fit in fits):
             continue
@@ -453,37 +456,53 @@ def refit_between(
 def fit_under_each_assumption(
     data: Data, natural: Intersample, fits: list[Fit], seen: Seen, *, alone: bool
 ) -> list[tuple[Intersample, Fit]]:
-    """Add to fits under the natural assumption those under the others, unless it stands alone."""
+    """Add to fits under the natural assumption those under the others, unless it stands alone.
+
+    Poles and zeros of a rich one may have made up for a wrong assumption: plainer ones are fitted
+    under the others as far as they may be about as likely.
+    """
     fitted = [(natural, fit) for fit in fits]
     if alone:
         return fitted
     best = min(fits, key=lambda fit: fit.objective)
     least, count = best.objective, data.problem(natural, seen).counted * best.share
     clearly = float(np.expm1(2 * CLEARLY / count)) * least
-    leading, trailing, plainer = [], [], []
+    leading, trailing, behind = [], [], []
     for fit in fits:
         plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
         if hopeful and (plain or fit.objective < least + clearly):
             leading.append(fit)
         elif hopeful or plain:
             trailing.append(fit)
-        elif fit.structure.parameters < best.structure.parameters:
-            plainer.append(fit)
+        else:
+            behind.append(fit)
     others = [mode for mode in BETWEEN if mode != natural]
-    hopeless = TWICE * least
 
     def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
         return [
-            (mode, refit_between(data.problem(mode, seen), fit, natural, mode, hopeless=hopeless))
-            for mode in others
+            (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
+            for mode, problem in problems.items()
             for fit in some
         ]
 
+    problems = {mode: data.problem(mode, seen) for mode in others}
     fitted += moved(leading)
-    better = min(fit.objective for _, fit in fitted) < least - clearly
-    rich = best.structure.name not in PLAIN
-    if better or rich:
+    if min(fit.objective for _, fit in fitted) < least - clearly:
         fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
-    if rich:
-        fitted += moved(plainer)  # poles and zeros may have made up for a wrong assumption
+    else:
+        behind += trailing
+    if best.structure.name in PLAIN:
+        return fitted
+    for fit in behind:
+        fewer = best.structure.parameters - fit.structure.parameters
+        asked = fewer > 0 and fit.structure.name not in PLAIN  # those were moved before the others
+        for mode, problem in problems.items() if asked else ():
+            most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+            start = shifted(fit.theta, natural, mode)
+            one = fit_structure(problem, fit.structure, start, iterations=_TASTE, hopeless=most)
+            if not one.converged and one.objective < TWICE**2 * least:
+                one = fit_structure(
+                    problem, fit.structure, one.theta, iterations=RETURNS, hopeless=most
+                )
+            fitted.append((mode, one))
     return fitted
