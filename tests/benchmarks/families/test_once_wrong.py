@@ -70,7 +70,7 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
     ("family", "seed", "index"),
     [
         ("by chance", 1003, 87),  # a slow pole stood for a drift beside a zero
-        ("by chance, more", 1003, 36),  # white noise was left by an integrator that explains nothing
+        ("by chance, more", 1003, 36),  # an integrator that explains nothing left white noise
         ("two inputs, modes", 1, 0),  # many poles had to leave white noise beside another input
     ],
 )

@@ -255,7 +255,9 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
         share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
-        if share > PART and misfit_at_any_lag(inputs[j], rest).probability < FALSE_ALARM / len(waiting):
+        if share > PART and misfit_at_any_lag(inputs[j], rest).probability < FALSE_ALARM / len(
+            waiting
+        ):
             found[j] = share
     return found
 

@@ -146,9 +146,7 @@ def responses_of(
             [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
         ),
         of_models=cache(
-            lambda: responses_of(
-                aligned, replace(output, values=joined.prediction), joined, inputs
-            )
+            lambda: responses_of(aligned, replace(output, values=joined.prediction), joined, inputs)
         ),
     )
 

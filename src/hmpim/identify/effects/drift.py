@@ -172,9 +172,7 @@ def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
     return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
 
-def drift_findings(
-    drifting: Drifting, fs: float, unit: str, *, white: bool
-) -> tuple[Finding, ...]:
+def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> tuple[Finding, ...]:
     """Say how the bias drifts, and doubt the noise where what is left is not `white`."""
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
