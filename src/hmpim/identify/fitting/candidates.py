@@ -42,6 +42,7 @@ __all__ = [
     "is_poor",
     "nested",
     "owed_to_input",
+    "pruned",
     "refit_between",
     "spans_record",
     "sums_to_noise",
@@ -166,7 +167,7 @@ def fit_rich(
     but half the power.
     """
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
-    found += _pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
+    found += pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
     if found and not min(found, key=lambda fit: fit.objective).is_white:
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
@@ -267,7 +268,7 @@ def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
         yield far[start : start + _AT_ONCE]
 
 
-def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit]:
+def pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit]:
     """Plainer structures from the slowest poles of those near the lead, the richest first.
 
     A pole or a zero that the record does not need lies anywhere; without it the rest begins close
@@ -285,7 +286,8 @@ def _pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fi
         above = [fit for fit in near if _holds(fit, structure)]
         if not above or any(f.structure == structure and behind(f) < 2 * CLEARLY for f in near):
             continue
-        start = without_fast(min(above, key=lambda f: f.structure.parameters), structure)
+        simplest = min(above, key=lambda f: (f.structure.parameters, f.objective))
+        start = without_fast(simplest, structure)
         if start is None:
             continue
         hopeless = TWICE * least

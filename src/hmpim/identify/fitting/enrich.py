@@ -98,7 +98,7 @@ def proposals(
     structures: list[Structure],
     fit: Fit,
     *,
-    count: int = 3,
+    count: int = 5,
     all_of_them: bool = False,
 ) -> list[Proposal]:
     """Structures with zeros or more than two poles that the response allows, promising ones first.

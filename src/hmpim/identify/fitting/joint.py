@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.beginning import look_again
-from hmpim.identify.fitting.candidates import refit_between
+from hmpim.identify.fitting.candidates import pruned, refit_between
 from hmpim.identify.fitting.course import (
     Course,
     continue_between,
@@ -30,7 +30,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows, polished, refit, refit_all
-from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
+from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
@@ -215,7 +215,24 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
         if one.grown and one.grown[-1].criterion < led.criterion:
             growth, led = one, one.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    return joint if led is joint.best else _led_by(led, joint, course)
+    if led is joint.best:
+        return joint
+    plainer = _plainer_than(led, joint, course, structures)
+    return _led_by(min([led, *plainer], key=lambda trial: trial.criterion), joint, course)
+
+
+def _plainer_than(
+    led: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
+) -> list[Trial]:
+    """What a grown trial is without what the record does not need of it.
+
+    The pole that is added may lead to where plainer structures had not begun.
+    """
+    problem = course.data.problem(led.intersample, course.counted)
+    count = problem.counted * joint.weighed_share
+    fits = [t.fit for t in joint.trials if t.intersample == led.intersample]
+    found = pruned(problem, fits, members(structures, (*RICH, *INTEGRATING)))
+    return [trial_of(led.intersample, fit, count) for fit in found]
 
 
 def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
