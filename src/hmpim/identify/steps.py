@@ -23,7 +23,7 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.candidates import spans_record
+from hmpim.identify.fitting.candidates import refit_between, spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,
@@ -181,7 +181,9 @@ def _fit_and_look_for_rows(
         nonlocal beside, hum
         names = question.plain if plainly else question.structures
         every = rows if humming is None else np.vstack([rows, humming.rows])
-        beside = _fit_once(question, seen, names, every, aside=aside)
+        before, beside = beside, _fit_once(question, seen, names, every, aside=aside)
+        if not several and not plainly and before is not fitted:
+            beside = _as_before(question, seen, every, before, beside)
         found = beside.fits[asked]
         if humming is None:
             return found
@@ -217,6 +219,22 @@ def _fit_and_look_for_rows(
     if several:
         return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
     return replace(kept, fits=(joint,), steady=None if drifting is None else fitted.prediction)
+
+
+def _as_before(
+    question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
+) -> OutputFit:
+    """What a search beside `rows` found, or the plainer dynamics of one beside others.
+
+    If these are likelier: a search may end in modes without number.
+    """
+    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
+    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
+        return found
+    course = completed(turn_ahead(_started(question, seen, rows)))
+    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
+    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
+    return OutputFit(fits=(joint,)) if joint.best.criterion < rich.criterion else found
 
 
 def _plain_beside_drift(
