@@ -76,7 +76,8 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
             return Described(pairs=(pair,))
         said = question.swapped or unfollowed(output.name, source.name)
         return Described(pairs=(_untold(question, 0, said),))
-    responses = responses_of(aligned, output, fitted, inputs)
+    told = seen.counting(np.asarray(output.valid), aligned.fs)
+    responses = responses_of(aligned, output, told, fitted, inputs)
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
@@ -285,7 +286,7 @@ def _bandwidths(
         u = question.aligned.inputs[i].values
         own = _local(u, fit.prediction, fit, fs, question.band(i))
     else:
-        own = matrix.of_models().columns[i]
+        own = matrix.of_models()[i]
     return less_bias(found, read(own), readings.parameters)
 
 
@@ -396,9 +397,7 @@ def _measured(
     fit, y = joint.best.fit, joint.problem.y  # without the drift
     if question.instrument is not None:
         return response_through(question.instrument, y, fs, band=band)
-    told = found.telling(y.size, fs)
-    if not question.output.valid.all():
-        told = question.output.valid if told is None else told & question.output.valid
+    told = found.counting(np.asarray(question.output.valid), fs)
     if told is None:
         return _local(u, y, fit, fs, band)
     response = _local(u, np.where(told, y, fit.prediction + fit.residual), fit, fs, band)

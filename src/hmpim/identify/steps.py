@@ -450,12 +450,7 @@ def _started(question: Question, seen: Imperfections, rows: Real | None = None) 
 
 def _counted(question: Question, seen: Imperfections) -> Mask | None:
     """Samples of the output that tell, (n,); None when all do."""
-    output = question.output
-    valid = None if bool(output.valid.all()) else np.asarray(output.valid)
-    told = seen.telling(output.values.size, question.aligned.fs)
-    if told is not None:
-        valid = told if valid is None else valid & told
-    return valid
+    return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
 
 
 def _fit_once(

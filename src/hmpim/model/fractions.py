@@ -91,7 +91,8 @@ def expanded(numerator: Real, denominator: Real) -> tuple[Complex, Complex, floa
         return None
     every = parted(np.roots(denominator[::-1]).astype(np.complex128))
     simple, constants, _ = partial_fractions(numerator[None, :], every, float(denominator[-1]))
-    s = 1j * np.abs(every)
+    away = np.abs(every)
+    s = 1j * np.where(away > 0.0, away, away.max())  # the pole of an integrator is no place to ask
     exact = np.polynomial.polynomial.polyval(s, numerator)
     exact = exact / np.polynomial.polynomial.polyval(s, denominator)
     error = np.sum(simple[0] / (s[:, None] - every), axis=1) + constants[0] - exact

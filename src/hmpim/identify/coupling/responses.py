@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.left import left_over
@@ -58,7 +58,7 @@ class Responses:
     columns: tuple[FrequencyResponse, ...]
     coherence: OutputCoherence  # the multiple one
     left: tuple[Misfit, ...]  # how far what all inputs leave over still follows each
-    of_models: Callable[[], "Responses"]  # the same of what the models predict, noise aside
+    of_models: Callable[[], tuple[FrequencyResponse, ...]]  # columns of what the models predict
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
@@ -88,51 +88,19 @@ def inputs_of(aligned: Aligned, record: Record) -> InputSet:
 
 
 def responses_of(
-    aligned: Aligned, output: Signal, joined: OutputFit, inputs: InputSet
+    aligned: Aligned, output: Signal, told: Mask | None, joined: OutputFit, inputs: InputSet
 ) -> Responses:
     """Response of one output to all inputs, each in its own band.
 
-    The band is cut where an input's own begins or ends; what an input beyond its band still
-    moves is taken out by its model.
+    `told` are the samples of the output that say what it was, (n,); None when all do.
     """
-    # One delay for all inputs: moving them against each other would make them look different.
-    kept = [fit for fit, strong in zip(joined.fits, joined.strong, strict=True) if strong]
-    strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
-    delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
-    parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
-    y, told = output.values, np.asarray(output.valid)
-    whole = joined.prediction
-    if joined.disturbance is not None:
-        y, whole = y - joined.disturbance, whole - joined.disturbance
-    span = aligned.samples / aligned.fs - delay
-    edges = sorted({edge for band in inputs.bands for edge in band})
-    pieces: list[tuple[list[int], ResponseMatrix]] = []
-    for low, high in pairwise(edges):
-        active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
-        bins = (high - low) * span
-        if not active or bins < 8 * (len(active) + 1) + 2:
-            continue
-        rest = y
-        modelled = whole
-        for j, part in enumerate(parts):
-            if j not in active and joined.fits[j].related:
-                rest, modelled = rest - part, modelled - part
-        pieces.append(
-            (
-                active,
-                response_matrix(
-                    np.stack([aligned.inputs[j].values for j in active]),
-                    rest[None, :],
-                    aligned.fs,
-                    delays=[[delay]],
-                    band=(low, high),
-                    valid=None if told.all() else told,
-                    fill=modelled[None, :],
-                    points=200,
-                    names=[*(aligned.inputs[j].name for j in active), output.name],
-                ),
-            )
-        )
+    pieces = _pieces(aligned, output, told, joined, inputs)
+
+    def of_models() -> tuple[FrequencyResponse, ...]:
+        predicted = replace(output, values=joined.prediction)
+        alone = _pieces(aligned, predicted, told, joined, inputs)
+        return tuple(_column(alone, j) for j in range(len(aligned.inputs)))
+
     return Responses(
         columns=tuple(_column(pieces, j) for j in range(len(aligned.inputs))),
         coherence=OutputCoherence(
@@ -145,10 +113,51 @@ def responses_of(
             joined.fits,
             [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
         ),
-        of_models=cache(
-            lambda: responses_of(aligned, replace(output, values=joined.prediction), joined, inputs)
-        ),
+        of_models=cache(of_models),
     )
+
+
+def _pieces(
+    aligned: Aligned, output: Signal, told: Mask | None, joined: OutputFit, inputs: InputSet
+) -> list[tuple[list[int], ResponseMatrix]]:
+    """Responses in each band, and the inputs that they are to.
+
+    The band is cut where an input's own begins or ends; what an input beyond its band still
+    moves is taken out by its model.
+    """
+    # One delay for all inputs: moving them against each other would make them look different.
+    kept = [fit for fit, strong in zip(joined.fits, joined.strong, strict=True) if strong]
+    strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
+    delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
+    parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
+    y, whole = output.values, joined.prediction
+    if joined.disturbance is not None:
+        y, whole = y - joined.disturbance, whole - joined.disturbance
+    span = aligned.samples / aligned.fs - delay
+    edges = sorted({edge for band in inputs.bands for edge in band})
+    pieces: list[tuple[list[int], ResponseMatrix]] = []
+    for low, high in pairwise(edges):
+        active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
+        bins = (high - low) * span
+        if not active or bins < 8 * (len(active) + 1) + 2:
+            continue
+        rest, modelled = y, whole
+        for j, part in enumerate(parts):
+            if j not in active and joined.fits[j].related:
+                rest, modelled = rest - part, modelled - part
+        found = response_matrix(
+            np.stack([aligned.inputs[j].values for j in active]),
+            rest[None, :],
+            aligned.fs,
+            delays=[[delay]],
+            band=(low, high),
+            valid=told,
+            fill=modelled[None, :],
+            points=200,
+            names=[*(aligned.inputs[j].name for j in active), output.name],
+        )
+        pieces.append((active, found))
+    return pieces
 
 
 def _joined_up(arrays: list[Real]) -> Real:

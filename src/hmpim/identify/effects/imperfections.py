@@ -96,6 +96,13 @@ class Imperfections:
             told &= ~lost
         return told
 
+    def counting(self, valid: Mask, fs: float) -> Mask | None:
+        """Samples that are valid, and say what the output was; None when all are and do."""
+        told = self.telling(valid.size, fs)
+        if bool(valid.all()):
+            return told
+        return valid if told is None else np.asarray(valid & told)
+
 
 def find_imperfections(
     y: Real,

@@ -14,6 +14,7 @@ from hmpim.identify.fitting.enrich import (
     PLAIN,
     RICH,
     Proposal,
+    about,
     integrator_starts,
     members,
     proposals,
@@ -198,12 +199,18 @@ def _climbed(
     # A rough response that takes a free response for an answer proposes nothing that is of use.
     misled = data.keeps_samples and in_motion(data.u) and is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
+
+    def climbed(p: Proposal) -> Fit:
+        rivals = [*fits, *found]
+        starts = [*p.starts, *_grown(p.structure, rivals)]
+        far_off = misled and is_poor(min(rivals, key=lambda f: f.objective), problem.spread)
+        return _best_of(problem, p.structure, starts, rivals, far_off=far_off)
+
+    def explains(fit: Fit) -> bool:
+        return owed_to_input(problem, fit, data) <= MATERIAL and fit.is_white
+
     for some in _batches(proposed):
-        for p in some:
-            rivals = [*fits, *found]
-            starts = [*p.starts, *_grown(p.structure, rivals)]
-            far_off = misled and is_poor(min(rivals, key=lambda f: f.objective), problem.spread)
-            found.append(_best_of(problem, p.structure, starts, rivals, far_off=far_off))
+        found += (climbed(p) for p in some)
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
@@ -212,7 +219,13 @@ def _climbed(
             # Two modes that explain part of what follows the input stand for what is not linear.
             found += [f for f in grown if f.cost < PART * best.cost]
         best = min([best, *found], key=lambda fit: fit.objective)
-        if owed_to_input(problem, best, data) <= MATERIAL and best.is_white:
+        if explains(best):
+            return found
+    if best.structure.integrators:
+        return found
+    for p in proposals(about(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
+        found.append(climbed(p))
+        if explains(found[-1]):
             break
     return found
 

@@ -113,6 +113,7 @@ def start(
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
     nuisance: NDArray[np.float64] | None,
+    shared: bool = False,
 ) -> Course:
     """Start from the spectra, and climb with each plain structure, or an integrator that leads."""
     if intersample is None and looks_held(u):
@@ -127,7 +128,7 @@ def start(
     )
     course = begun(data, natural, structures, Seen(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
-    return replace(course, alone=intersample is not None, known=known, fits=fits)
+    return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
 
 
 def _leading_integrators(course: Course) -> list[Fit]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly, reweighted
 from hmpim.identify.fitting.start import RoughResponse, starting_values
@@ -22,6 +22,7 @@ __all__ = [
     "PLAIN",
     "RICH",
     "Proposal",
+    "about",
     "integrator_starts",
     "is_response",
     "members",
@@ -130,7 +131,8 @@ def proposals(
     for structure in structures:
         turns = np.append(near, late) if structure.zeros >= structure.order else near
         delays = np.maximum(fit.delay + reach * turns, -1.0)
-        starts = [] if structure.dc_zeros else [_from_plain(rough, structure, fit)]
+        lean = fit.structure.order <= 2 and not structure.dc_zeros
+        starts = [_from_plain(rough, structure, fit)] if lean else []
         errors, denominators = reweighted(rough, structure, delays)
         powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
         for i in np.argsort(errors):
@@ -194,11 +196,24 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
     return np.concatenate([[late], theta_of(structure, coefficients)])
 
 
-def _error(rough: RoughResponse, fit: Fit) -> float:
-    """Share of the rough response's power that a fit misses."""
+def about(left: RoughResponse, fit: Fit) -> RoughResponse:
+    """The rough response of an output, from that of what a fit leaves over of it.
+
+    Leakage is a share of what is transformed: of the residual it is little.
+    """
+    return replace(left, response=_modelled(left, fit) + left.response)
+
+
+def _modelled(rough: RoughResponse, fit: Fit) -> Complex:
+    """What a fit predicts of a rough response."""
     s = 1j * rough.omega
     b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.numerator, fit.denominator))
-    response = b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag))
+    return np.asarray(b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag)))
+
+
+def _error(rough: RoughResponse, fit: Fit) -> float:
+    """Share of the rough response's power that a fit misses."""
+    response = _modelled(rough, fit)
     missed, power = (np.abs(r) ** 2 for r in (rough.response - response, rough.response))
     return float((rough.weight @ missed) / (rough.weight @ power))
 

@@ -96,8 +96,7 @@ def joint_fit(
     """
     if intersample == "sampled":
         return software_fit(u, y, valid=valid, structures=structures, nuisance=nuisance)
-    course = start(u, y, valid, known, intersample, structures, nuisance)
-    course = replace(course, shared=shared)
+    course = start(u, y, valid, known, intersample, structures, nuisance, shared)
     course = turn_ahead(course)
     course = free_from_wander(course)
     course = interpolate_finely(course)
