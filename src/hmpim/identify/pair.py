@@ -78,11 +78,12 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
         return Described(pairs=(_untold(question, 0, said),))
     told = seen.counting(np.asarray(output.valid), aligned.fs)
     responses = responses_of(aligned, output, told, fitted, inputs)
+    none: tuple[Finding, ...] = ()
+    more, _ = attempt("misfit", lambda: unfound(fitted, responses, inputs), none)  # said of a pair
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
             pair = _pair(question, seen, fitted, i, responses)
-            more = unfound(fitted, responses, inputs)
             pair = replace(pair, warnings=(*pair.warnings, *more))
             pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
         else:
@@ -241,7 +242,7 @@ def _evidence(
 def _left(question: Question, joint: JointFit, i: int, matrix: Responses | None) -> Misfit:
     """How much of the residual still follows the input."""
     if matrix is not None:
-        return matrix.left[i]
+        return matrix.left()[i]
     fs, (low, high), fit = question.aligned.fs, question.band(i), joint.best.fit
     u = question.aligned.inputs[i].values
     return misfit(u, fit.residual, delay=fit.delay, band=(low / fs, high / fs))

@@ -224,9 +224,9 @@ def _fit_and_look_for_rows(
 def _as_before(
     question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
 ) -> OutputFit:
-    """What a search beside `rows` found, or the plainer dynamics of one beside others.
+    """Keep what a search beside `rows` found, or the plainer dynamics found before, if likelier.
 
-    If these are likelier: a search may end in modes without number.
+    A search may end in modes without number.
     """
     (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
     if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
@@ -234,7 +234,8 @@ def _as_before(
     course = completed(turn_ahead(_started(question, seen, rows)))
     again = refit_between(course.problem, best.fit, best.intersample, course.natural)
     joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    return OutputFit(fits=(joint,)) if joint.best.criterion < rich.criterion else found
+    gain = gain_by_rows(joint, 0, rich.fit, found.fits[0].problem)
+    return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
 def _plain_beside_drift(

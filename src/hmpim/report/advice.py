@@ -58,7 +58,7 @@ _ADVICE = {
     "intersample": "State what the input does between samples: `--intersample`.",
     "held_between": "Record input and output with one clock.",
     "held_output": "Identify the record itself.",
-    "drift_or_noise": "Let the unit warm up; compress with `knots=`, of statistics.",
+    "drift_or_noise": "Let the unit warm up; for statistics, compress with `knots=`.",
     "cut_response": "Compress with more `lags`.",
     "perhaps_software": "Identify the record itself.",
     "hold": "Nothing to do if the unit is known to hold its output.",

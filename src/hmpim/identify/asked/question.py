@@ -80,9 +80,9 @@ def _known(source: Signal) -> Mask:
 
 
 def _shortest_stay(u: Real, valid: Mask) -> float:
-    """Samples for which an input stays at a level at least, before it goes to one it had before.
+    """Shortest complete stay at a level, in samples; infinite where levels hardly recur.
 
-    A shorter gap between two equal values hides no motion. Infinite where levels do not recur.
+    A shorter gap between two equal values hides no motion.
     """
     told = u[valid]
     stays = 1 + np.count_nonzero(np.diff(told))

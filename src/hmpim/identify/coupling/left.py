@@ -9,17 +9,17 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.section_iv.correlation import likeness
-from hmpim.identify.section_iv.spectrum import excited_band
 
 __all__ = ["left_over", "misfit_at_any_lag"]
 
 
-def misfit_at_any_lag(u: Real, y: Real) -> Misfit:
+def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
     """Test whether an output follows an input, at the lag at which they are most alike.
 
     Of the record as it is, or after a window: what is left of the record's beginning hides a
     response from the one, little of it in the middle of the record from the other. After Hann's
     window every other bin is independent, and those are the bins of the record folded in two.
+    The band is in cycles per sample.
 
     Returns
     -------
@@ -27,7 +27,7 @@ def misfit_at_any_lag(u: Real, y: Real) -> Misfit:
         The chance of either, and the larger share of what either finds.
     """
     lag = likeness(u, y, u.size // 2 - 1).lag
-    band, half = excited_band(u, 1.0), u.size // 2
+    half = u.size // 2
     window = np.hanning(u.size)
     late = np.concatenate([np.zeros(lag), (u - u.mean())[: u.size - lag]])
     pair = window * late, window * (y - y.mean())
@@ -58,14 +58,14 @@ def left_over(
     bands : sequence of (float, float)
         Band that each input excites, in cycles per sample.
     """
-    told = next((fit.best.fit for fit in fits if fit.related), None)
+    some = next((fit.best.fit for fit in fits if fit.related), None)
     found = []
     for u, fit, band in zip(inputs, fits, bands, strict=True):
         asked = [Misfit(share=0.0, probability=1.0)]
         if fit.related:
             best = fit.best.fit
             asked.append(misfit(u, best.residual, delay=best.delay, band=band))
-        if told is not None and not told.is_white:
-            asked.append(misfit_at_any_lag(u, told.residual))
+        if some is not None and not some.is_white:
+            asked.append(misfit_at_any_lag(u, some.residual, band))
         found.append(min(asked, key=lambda one: one.probability))
     return tuple(found)

@@ -32,6 +32,7 @@ from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.section_iv.correlation import likeness
+from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
@@ -171,6 +172,7 @@ def fit_together(
             break  # else each was fitted to the wrong rest
     if pairs.reopen():
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
+        _fit_couplings(inputs, pairs, plain)
         pairs.refine(pairs.kept, None)
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
@@ -251,13 +253,12 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
         counted = pairs.valid  # nothing is told of what is hardly seen
     constant = constant_of(pairs.fits[pairs.strong[0]])
-    found = {}
+    found, rare = {}, FALSE_ALARM / max(len(waiting), 1)
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
         share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
-        if share > PART and misfit_at_any_lag(inputs[j], rest).probability < FALSE_ALARM / len(
-            waiting
-        ):
+        band = excited_band(inputs[j], 1.0)
+        if share > PART and misfit_at_any_lag(inputs[j], rest, band).probability < rare:
             found[j] = share
     return found
 

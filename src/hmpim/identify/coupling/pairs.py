@@ -10,7 +10,7 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.growth import SURE
+from hmpim.identify.fitting.growth import FEW_POLES
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, PART, TWICE
@@ -81,7 +81,7 @@ class Pairs:
     def put(self, i: int, fit: JointFit) -> None:
         """Take a fit of one input to what the others leave over, and the samples it counts.
 
-        What does not follow an input is known wherever the output is.
+        An unrelated input masks no samples.
         """
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
@@ -108,7 +108,7 @@ class Pairs:
             Whether there is one.
         """
         best = [self.fits[i].best.fit for i in self.strong]
-        unsure = any(fit.structure.order > SURE and not fit.is_white for fit in best)
+        unsure = any(fit.structure.order > FEW_POLES and not fit.is_white for fit in best)
         if unsure:
             self._seen.clear()
         return unsure

@@ -57,7 +57,8 @@ class Responses:
     # partial one
     columns: tuple[FrequencyResponse, ...]
     coherence: OutputCoherence  # the multiple one
-    left: tuple[Misfit, ...]  # how far what all inputs leave over still follows each
+    # how far what all inputs leave over still follows each
+    left: Callable[[], tuple[Misfit, ...]]
     of_models: Callable[[], tuple[FrequencyResponse, ...]]  # columns of what the models predict
 
 
@@ -108,10 +109,12 @@ def responses_of(
             frequency=_joined_up([m.frequency for _, m in pieces]),
             multiple=_joined_up([m.multiple_coherence[:, 0] for _, m in pieces]),
         ),
-        left=left_over(
-            [source.values for source in aligned.inputs],
-            joined.fits,
-            [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
+        left=cache(
+            lambda: left_over(
+                [source.values for source in aligned.inputs],
+                joined.fits,
+                [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
+            )
         ),
         of_models=cache(of_models),
     )
@@ -225,13 +228,13 @@ def unfound(joined: OutputFit, matrix: Responses, inputs: InputSet) -> tuple[Fin
     return tuple(
         Finding(
             code="unfound_response",
-            message=f"The residual still follows input {name!r}, whose response was not found: it "
-            f"is about {percent(left.share)} % of what counts as noise. "
+            message=f"The residual still follows input {name!r}, whose response was not found: "
+            f"about {percent(left.share)} % of the residual's power. "
             f"Excite {name!r} more, or alone.",
             severity="doubt",
             parameters=("noise_std",),
         )
-        for name, fit, left in zip(inputs.names, joined.fits, matrix.left, strict=True)
+        for name, fit, left in zip(inputs.names, joined.fits, matrix.left(), strict=True)
         if not fit.related and left.probability < FALSE_ALARM and left.share > 2 * FEW
     )
 
@@ -245,16 +248,16 @@ def with_noise_doubted(
     """
     found = []
     for pair, fit in zip(pairs, joined.fits, strict=True):
-        known = {finding.code for finding in pair.warnings}
+        known = {finding.code for finding in pair.warnings if _of_the_noise(finding)}
         others = (other for other in pairs if other is not pair)
-        shared = {f.code: (o.input, f) for o in others for f in o.warnings if _of_the_noise(f)}
+        elsewhere = {f.code: (o.input, f) for o in others for f in o.warnings if _of_the_noise(f)}
         more = tuple(
             replace(
                 finding,
                 message=f"Beside input {source!r}: {finding.message}",
                 parameters=("noise_std",),
             )
-            for code, (source, finding) in shared.items()
+            for code, (source, finding) in elsewhere.items()
             if fit.related and code not in known
         )
         found.append(replace(pair, warnings=(*pair.warnings, *more)) if more else pair)

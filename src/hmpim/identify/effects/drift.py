@@ -104,7 +104,7 @@ def with_drift(
     every = _polynomials(first.problem.y.size, _DEGREES[-1])
     joint = fitted(every, True)
     plainly = is_white(joint.best.fit.residual)
-    if not plainly:  # of what a model lacks the drift takes no shape
+    if not plainly:  # else the drift takes the shape of missing dynamics
         joint = fitted(every, False)
     columns = _shape(joint, every)
 
@@ -190,8 +190,8 @@ def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> 
         return (drifts,)
     unsure = Finding(
         code="drift_or_noise",
-        message="The residual is not white once the drift is removed: what is slow in it may be "
-        "drift too, and is no noise then. Let the unit warm up, and repeat the test.",
+        message="The residual is not white once the drift is removed: slow parts of it may be "
+        "drift rather than noise. Let the unit warm up, and repeat the test.",
         severity="doubt",
         parameters=("noise_std",),
     )

@@ -20,6 +20,7 @@ from hmpim.identify.effects.lost import (
     find_repeated,
     find_spikes,
     find_stuck,
+    may_repeat,
     stands_out,
 )
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
@@ -54,6 +55,7 @@ class Imperfections:
     spikes: Mask | None = None
     frozen: Mask | None = None
     repeated: Mask | None = None
+    unsure: Mask | None = None  # may be copies of samples that are lost
     levels: int | None = None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
@@ -68,7 +70,8 @@ class Imperfections:
     @property
     def lost(self) -> Mask | None:
         """Samples that say nothing at all: spikes, copies, and where the output stood still."""
-        seen = [s for s in (self.spikes, self.frozen, self.repeated) if s is not None]
+        every = (self.spikes, self.frozen, self.repeated, self.unsure)
+        seen = [some for some in every if some is not None]
         return np.logical_or.reduce(seen) if seen else None
 
     @property
@@ -131,13 +134,15 @@ def find_imperfections(
         frozen = find_frozen(y, prediction, step=step)
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
+    repeated = find_repeated(y) if rounding is None and hold is None else None
     return Imperfections(
         saturation=clipping,
         hold=hold,
         quantization=rounding,
         spikes=spikes,
         frozen=frozen,
-        repeated=find_repeated(y, valid) if rounding is None and hold is None else None,
+        repeated=repeated,
+        unsure=None if repeated is None or valid is None else may_repeat(valid),
         levels=_few_levels(y, inputs),
     )
 

@@ -20,6 +20,7 @@ __all__ = [
     "find_repeated",
     "find_spikes",
     "find_stuck",
+    "may_repeat",
     "stand_out",
     "stands_out",
 ]
@@ -160,13 +161,12 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
     return np.arange(y.size) >= first
 
 
-def find_repeated(y: Real, valid: Mask | None = None) -> Mask | None:
+def find_repeated(y: Real) -> Mask | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
     A frame that was lost is often filled by the one before it. An output that is rounded, held or
     at rest repeats itself too, but not for a sample or two now and then. Two alike at the highest
     or lowest value may be clipped: alone they tell of no lost frame, beside others they are one.
-    Where frames repeat, the first sample after one that is not `valid` may be a copy of that.
 
     Examples
     --------
@@ -186,8 +186,15 @@ def find_repeated(y: Real, valid: Mask | None = None) -> Mask | None:
             copies[a:b] = False
         elif y[a] not in extreme:
             inside += b - a
-    if inside < max(3, WORTH * y.size):
-        return None
-    if valid is not None:
-        copies[1:] |= valid[1:] & ~valid[:-1]
-    return copies
+    return copies if inside >= max(3, WORTH * y.size) else None
+
+
+def may_repeat(valid: Mask) -> Mask:
+    """Samples that come after one that is not valid: where frames repeat, they may be its copies.
+
+    Examples
+    --------
+    >>> may_repeat(np.array([True, False, False, True, True])).tolist()
+    [False, False, False, True, False]
+    """
+    return valid & ~np.concatenate([[True], valid[:-1]])

@@ -21,7 +21,7 @@ from hmpim.identify.fitting.enrich import (
     without_fast,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import SURE, one_more_pole, scale_of, with_pole
+from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import steps_through
 from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.rows import STAMPED_LATE
@@ -164,15 +164,15 @@ def fit_rich(
     """Fits of the richer structures, the most promising first, until nothing is left to explain.
 
     And those that are a richer one without what the record does not need of it. Where the output is
-    `shared` with inputs that are not fitted to their end, many poles need not leave white noise,
-    but half the power.
+    `shared` with inputs whose fits are unfinished, many poles need not leave white noise, but at
+    most half the power that few leave.
     """
-    found = _climbed(data, problem, fits, structures, all_of_them=all_of_them)
+    found = _climbed(data, problem, fits, structures, all_of_them=all_of_them, shared=shared)
     found += pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
     if found and not min(found, key=lambda fit: fit.objective).is_white:
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
-        few = [f for f in found if f.structure.order <= SURE]
+        few = [f for f in found if f.structure.order <= FEW_POLES]
         enough = min((f.objective for f in [*fits, *few]), default=np.inf) / TWICE
         many = [f for f in found if shared and f not in few and f.objective < enough]
         found = [f for f in [*few, *many] if not spans_record(f)]
@@ -189,8 +189,12 @@ def _climbed(
     structures: tuple[StructureName, ...],
     *,
     all_of_them: bool,
+    shared: bool,
 ) -> list[Fit]:
-    """Fits of richer structures from the rough response, until nothing is left to explain."""
+    """Fits of richer structures from the rough response, until nothing is left to explain.
+
+    And, where that is not shared with other inputs, from what the best of them leaves over.
+    """
     found = fit_integrating(data, problem, fits, structures)
     if sums_to_noise([*fits, *found]):
         return found
@@ -210,7 +214,8 @@ def _climbed(
         return owed_to_input(problem, fit, data) <= MATERIAL and fit.is_white
 
     for some in _batches(proposed):
-        found += (climbed(p) for p in some)
+        for p in some:
+            found.append(climbed(p))
         if not some:
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
@@ -221,11 +226,15 @@ def _climbed(
         best = min([best, *found], key=lambda fit: fit.objective)
         if explains(best):
             return found
-    if best.structure.integrators:
+    if shared or best.structure.integrators:
         return found
     for p in proposals(about(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
-        found.append(climbed(p))
-        if explains(found[-1]):
+        fit = climbed(p)
+        same = [one for one in found if one.structure == p.structure]
+        if any(one.objective <= fit.objective for one in same):
+            continue
+        found = [*(one for one in found if one not in same), fit]
+        if explains(fit):
             break
     return found
 
@@ -242,7 +251,7 @@ def fit_integrating(
     for structure in members(structures, INTEGRATING):
         if sums_to_noise([*fits, *found]):
             break
-        if found and found[-1].cost > NEARLY * problem.spread:
+        if found and found[-1].objective > NEARLY * problem.spread:
             break
         if any(fit.structure == structure for fit in fits):
             continue
@@ -510,9 +519,10 @@ def fit_under_each_assumption(
         return fitted
     for fit in behind:
         fewer = best.structure.parameters - fit.structure.parameters
-        asked = fewer > 0 and fit.structure.name not in PLAIN  # those were moved before the others
-        for mode, problem in problems.items() if asked else ():
-            most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+        if fewer <= 0 or fit.structure.name in PLAIN:  # plain ones are far behind a rich one
+            continue
+        most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+        for mode, problem in problems.items():
             start = shifted(fit.theta, natural, mode)
             one = fit_structure(problem, fit.structure, start, iterations=_TASTE, hopeless=most)
             if not one.converged and one.objective < TWICE**2 * least:

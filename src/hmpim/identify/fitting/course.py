@@ -79,7 +79,7 @@ class Course:
     settled : Fit or None
         The best of them where it leaves white noise and the record begins at rest: it is polished.
     shared : bool
-        Whether inputs that are not fitted to their end move the output too.
+        Whether other inputs, whose fits are unfinished, move the output too.
     """
 
     data: Data

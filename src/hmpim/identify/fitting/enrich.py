@@ -199,7 +199,7 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
 def about(left: RoughResponse, fit: Fit) -> RoughResponse:
     """The rough response of an output, from that of what a fit leaves over of it.
 
-    Leakage is a share of what is transformed: of the residual it is little.
+    Leakage is proportional to the signal transformed, so the residual has little.
     """
     return replace(left, response=_modelled(left, fit) + left.response)
 

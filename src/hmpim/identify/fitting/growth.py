@@ -29,7 +29,7 @@ from hmpim.identify.worth import MATERIAL, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, coefficients_of, theta_of
 
 __all__ = [
-    "SURE",
+    "FEW_POLES",
     "Growth",
     "HiddenPole",
     "as_if_hidden",
@@ -61,7 +61,7 @@ _ANY = 10_000_000
 _MOST = 7
 """Poles up to which one more is asked for."""
 
-SURE = 4
+FEW_POLES = 4
 """Poles up to which a structure may leave more than white noise."""
 
 
@@ -392,7 +392,7 @@ def grow(
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
-        sure = richer.order <= SURE or white(found)
+        sure = richer.order <= FEW_POLES or white(found)
         gain = min(gain, seen * float(np.log(otherwise(best) / found.fit.objective)))
         if gain < np.log(seen) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)

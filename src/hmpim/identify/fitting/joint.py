@@ -87,7 +87,7 @@ def joint_fit(
     growing : bool
         Whether it is asked for one more pole at the end, and what that leaves open.
     shared : bool
-        Whether inputs that are not fitted to their end move the output too: many poles need not
+        Whether other inputs, whose fits are unfinished, move the output too: many poles need not
         leave white noise then.
 
     Returns
@@ -216,8 +216,12 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
     if led is joint.best:
         return joint
-    plainer = _plainer_than(led, joint, course, structures)
-    return _led_by(min([led, *plainer], key=lambda trial: trial.criterion), joint, course)
+    best = min(
+        [led, *_plainer_than(led, joint, course, structures)], key=lambda trial: trial.criterion
+    )
+    if best is not led:  # of one more pole beside it nothing is known
+        joint = replace(joint, rivals=(), hidden=None)
+    return _led_by(best, joint, course)
 
 
 def _plainer_than(
