@@ -197,4 +197,4 @@ def may_repeat(valid: Mask) -> Mask:
     >>> may_repeat(np.array([True, False, False, True, True])).tolist()
     [False, False, False, True, False]
     """
-    return valid & ~np.concatenate([[True], valid[:-1]])
+    return np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
