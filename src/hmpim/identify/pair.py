@@ -157,7 +157,11 @@ def _pair(
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *_drifts(drifting, readings, aligned.fs, output.unit),
+        *(
+            ()
+            if drifting is None
+            else drift_findings(drifting, aligned.fs, output.unit, white=readings.white)
+        ),
         *(() if humming is None else (hum_finding(humming, aligned.fs, output.unit),)),
         *(*unseen, *unmoved, *unread, *untested),
     )
@@ -183,13 +187,6 @@ def _pair(
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else inspection.summary,
     )
-
-
-def _drifts(
-    drifting: Drifting | None, readings: Readings, fs: float, unit: str
-) -> tuple[Finding, ...]:
-    """What is said of a drift; nothing where there is none."""
-    return () if drifting is None else drift_findings(drifting, fs, unit, white=readings.white)
 
 
 def _evidence(

@@ -23,7 +23,8 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost import stands_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.candidates import refit_between, spans_record
+from hmpim.identify.fitting.between import refit_between
+from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,

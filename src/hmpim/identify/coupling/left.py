@@ -59,13 +59,14 @@ def left_over(
         Band that each input excites, in cycles per sample.
     """
     some = next((fit.best.fit for fit in fits if fit.related), None)
+    coloured = None if some is None or some.is_white else some.residual
     found = []
     for u, fit, band in zip(inputs, fits, bands, strict=True):
         asked = [Misfit(share=0.0, probability=1.0)]
         if fit.related:
             best = fit.best.fit
             asked.append(misfit(u, best.residual, delay=best.delay, band=band))
-        if some is not None and not some.is_white:
-            asked.append(misfit_at_any_lag(u, some.residual, band))
+        if coloured is not None:
+            asked.append(misfit_at_any_lag(u, coloured, band))
         found.append(min(asked, key=lambda one: one.probability))
     return tuple(found)

@@ -5,7 +5,8 @@ rows, sections  what each linear parameter multiplies; poles in sections
 start           starting values: delay and denominator from spectra
 joint           all structures, all assumptions between the samples, and the choice
 data            what all trials of a joint fit share
-candidates      fits of every structure, under each assumption
+candidates      fits of every structure under one assumption
+between         the same under each other, from where they ended
 enrich          which richer structures to try, and where from
 course          the way up to the choice: start, ahead, wander, beginning, enrichment
 beginning       which samples count, and whether the record begins at rest

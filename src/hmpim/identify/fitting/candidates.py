@@ -1,4 +1,4 @@
-"""Fits of every structure: plain ones, richer ones where asked for, each between the samples."""
+"""Fits of every structure under one assumption: plain ones, and richer ones where asked for."""
 
 from collections.abc import Iterator, Sequence
 
@@ -7,11 +7,10 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import RETURNS, Data, Seen, hopeless_beside, shifted
+from hmpim.identify.fitting.data import TASTE, Data, hopeless_beside
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
-    PLAIN,
     RICH,
     Proposal,
     about,
@@ -32,19 +31,16 @@ from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
-from hmpim.record import BETWEEN, Intersample
 
 __all__ = [
     "almost_integrates",
     "fit_integrating",
     "fit_plain",
     "fit_rich",
-    "fit_under_each_assumption",
     "is_poor",
     "nested",
     "owed_to_input",
     "pruned",
-    "refit_between",
     "spans_record",
     "sums_to_noise",
 ]
@@ -57,9 +53,6 @@ _PARTNER = 0.3
 
 _AT_ONCE = 4
 """Richer structures tried before it is asked whether more are needed."""
-
-_TASTE = 4
-"""Steps taken from each start before the best one is followed to its end."""
 
 _SLIPS = 4
 """Half periods by which the delay of a fit in mid-motion is moved either way, to start again."""
@@ -92,7 +85,7 @@ def fit_plain(
             starts = known or starting_values(rough, structure, thorough=False)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
         hopeless = TWICE * hopeful if settled else np.inf
-        fit = fit_structure(problem, structure, starts[0], iterations=_TASTE, hopeless=hopeless)
+        fit = fit_structure(problem, structure, starts[0], iterations=TASTE, hopeless=hopeless)
         # A residual of noise for the most part is white whatever the model misses.
         noisy = fit.cost > MOST * problem.spread
         white = fit.objective < hopeful and fit.is_white
@@ -117,7 +110,7 @@ def fit_plain(
     for i, fit in enumerate(fits):
         for other in fits:
             if _nests(other, fit):
-                rival = fit_structure(problem, fit.structure, nested(other), iterations=_TASTE)
+                rival = fit_structure(problem, fit.structure, nested(other), iterations=TASTE)
                 fits[i] = min(fits[i], rival, key=lambda f: f.objective)
     least = min(fit.objective for fit in fits)
 
@@ -136,7 +129,7 @@ def _tasted(problem: Problem, starts: Sequence[Real], best: Fit) -> Fit:
     """The best of a fit and of a few steps from each other start that leads near it."""
     for theta in starts:
         hopeless = TWICE * best.objective
-        rival = fit_structure(problem, best.structure, theta, iterations=_TASTE, hopeless=hopeless)
+        rival = fit_structure(problem, best.structure, theta, iterations=TASTE, hopeless=hopeless)
         best = min(best, rival, key=lambda fit: fit.objective)
     return best
 
@@ -168,7 +161,7 @@ def fit_rich(
     most half the power that few leave.
     """
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them, shared=shared)
-    found += pruned(problem, [*fits, *found], members(structures, (*RICH, *INTEGRATING)))
+    found += pruned(problem, [*fits, *found], structures)
     if found and not min(found, key=lambda fit: fit.objective).is_white:
         # Poles without end, or as slow as the record, follow what no linear model describes:
         # friction, rounding.
@@ -290,13 +283,14 @@ def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
         yield far[start : start + _AT_ONCE]
 
 
-def pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit]:
-    """Plainer structures from the slowest poles of those near the lead, the richest first.
+def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
+    """Plainer rich structures from the slowest poles of those near the lead, the richest first.
 
     A pole or a zero that the record does not need lies anywhere; without it the rest begins close
     to its best, where a rough response may have proposed nothing of use.
     """
     found: list[Fit] = []
+    rich = members(structures, (*RICH, *INTEGRATING))
     for structure in sorted(rich, key=lambda one: -one.parameters):
         every = [*fits, *found]
         least = min(fit.objective for fit in every)
@@ -313,7 +307,7 @@ def pruned(problem: Problem, fits: list[Fit], rich: list[Structure]) -> list[Fit
         if start is None:
             continue
         hopeless = TWICE * least
-        taste = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
+        taste = fit_structure(problem, structure, start, iterations=TASTE, hopeless=hopeless)
         if taste.objective < hopeless:
             fit = _best_of(problem, structure, [taste.theta], near)
             if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
@@ -462,72 +456,3 @@ def _without_second_pole(second_order: Fit) -> Real:
 def nested(first_order: Fit) -> Real:
     """First order as second: a quarter of its time constant moved into a second pole."""
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)
-
-
-def refit_between(
-    problem: Problem,
-    fit: Fit,
-    origin: Intersample,
-    mode: Intersample,
-    *,
-    hopeless: float = np.inf,
-) -> Fit:
-    """Fit the same structure under another assumption, from where the first one ended."""
-    theta = shifted(fit.theta, origin, mode)
-    return fit_structure(problem, fit.structure, theta, iterations=RETURNS, hopeless=hopeless)
-
-
-def fit_under_each_assumption(
-    data: Data, natural: Intersample, fits: list[Fit], seen: Seen, *, alone: bool
-) -> list[tuple[Intersample, Fit]]:
-    """Add to fits under the natural assumption those under the others, unless it stands alone.
-
-    Poles and zeros of a rich one may have made up for a wrong assumption: plainer ones are fitted
-    under the others as far as they may be about as likely.
-    """
-    fitted = [(natural, fit) for fit in fits]
-    if alone:
-        return fitted
-    best = min(fits, key=lambda fit: fit.objective)
-    least, count = best.objective, data.problem(natural, seen).counted * best.share
-    clearly = float(np.expm1(2 * CLEARLY / count)) * least
-    leading, trailing, behind = [], [], []
-    for fit in fits:
-        plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
-        if hopeful and (plain or fit.objective < least + clearly):
-            leading.append(fit)
-        elif hopeful or plain:
-            trailing.append(fit)
-        else:
-            behind.append(fit)
-    others = [mode for mode in BETWEEN if mode != natural]
-
-    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
-        return [
-            (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
-            for mode, problem in problems.items()
-            for fit in some
-        ]
-
-    problems = {mode: data.problem(mode, seen) for mode in others}
-    fitted += moved(leading)
-    if min(fit.objective for _, fit in fitted) < least - clearly:
-        fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
-    else:
-        behind += trailing
-    if best.structure.name in PLAIN:
-        return fitted
-    for fit in behind:
-        fewer = best.structure.parameters - fit.structure.parameters
-        if fewer <= 0 or fit.structure.name in PLAIN:  # plain ones are far behind a rich one
-            continue
-        most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
-        for mode, problem in problems.items():
-            start = shifted(fit.theta, natural, mode)
-            one = fit_structure(problem, fit.structure, start, iterations=_TASTE, hopeless=most)
-            if not one.converged and one.objective < TWICE**2 * least:
-                one = fit_structure(
-                    problem, fit.structure, one.theta, iterations=RETURNS, hopeless=most
-                )
-            fitted.append((mode, one))
-    return fitted

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
+from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
     fit_integrating,
     fit_plain,
     fit_rich,
-    fit_under_each_assumption,
     is_poor,
     owed_to_input,
     spans_record,

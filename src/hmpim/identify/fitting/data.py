@@ -25,6 +25,7 @@ from hmpim.record import Intersample
 
 __all__ = [
     "RETURNS",
+    "TASTE",
     "Data",
     "Seen",
     "follows",
@@ -38,6 +39,9 @@ __all__ = [
 
 RETURNS = 12
 """Steps that a fit is taken from where it ended when what it is fitted to has changed."""
+
+TASTE = 4
+"""Steps taken from each start before the best one is followed to its end."""
 
 prepared = kept(prepare_input)
 """An input prepared under an assumption, as `hmpim.model.sampled.prepare_input` does it."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.fitting.beginning import look_again
-from hmpim.identify.fitting.candidates import pruned, refit_between
+from hmpim.identify.fitting.between import refit_between
+from hmpim.identify.fitting.candidates import pruned
 from hmpim.identify.fitting.course import (
     Course,
     continue_between,
@@ -30,7 +31,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows, polished, refit, refit_all
-from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH, members
+from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
@@ -234,7 +235,7 @@ def _plainer_than(
     problem = course.data.problem(led.intersample, course.counted)
     count = problem.counted * joint.weighed_share
     fits = [t.fit for t in joint.trials if t.intersample == led.intersample]
-    found = pruned(problem, fits, members(structures, (*RICH, *INTEGRATING)))
+    found = pruned(problem, fits, structures)
     return [trial_of(led.intersample, fit, count) for fit in found]
 
 

@@ -1,0 +1,78 @@
+"""Fits under each assumption between the samples, from where they ended under another."""
+
+import numpy as np
+
+from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Seen, shifted
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.worth import TWICE
+from hmpim.record import BETWEEN, Intersample
+
+__all__ = ["fit_under_each_assumption", "refit_between"]
+
+
+def refit_between(
+    problem: Problem,
+    fit: Fit,
+    origin: Intersample,
+    mode: Intersample,
+    *,
+    iterations: int = RETURNS,
+    hopeless: float = np.inf,
+) -> Fit:
+    """Fit the same structure under another assumption, from where the first one ended."""
+    theta = shifted(fit.theta, origin, mode)
+    return fit_structure(problem, fit.structure, theta, iterations=iterations, hopeless=hopeless)
+
+
+def fit_under_each_assumption(
+    data: Data, natural: Intersample, fits: list[Fit], seen: Seen, *, alone: bool
+) -> list[tuple[Intersample, Fit]]:
+    """Add to fits under the natural assumption those under the others, unless it stands alone.
+
+    Poles and zeros of a rich one may have made up for a wrong assumption: plainer ones are fitted
+    under the others as far as they may be about as likely.
+    """
+    fitted = [(natural, fit) for fit in fits]
+    if alone:
+        return fitted
+    best = min(fits, key=lambda fit: fit.objective)
+    least, count = best.objective, data.problem(natural, seen).counted * best.share
+    clearly = float(np.expm1(2 * CLEARLY / count)) * least
+    leading, trailing, behind = [], [], []
+    for fit in fits:
+        plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
+        if hopeful and (plain or fit.objective < least + clearly):
+            leading.append(fit)
+        elif hopeful or plain:
+            trailing.append(fit)
+        else:
+            behind.append(fit)
+    problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
+
+    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+        return [
+            (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
+            for mode, problem in problems.items()
+            for fit in some
+        ]
+
+    fitted += moved(leading)
+    if min(fit.objective for _, fit in fitted) < least - clearly:
+        fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
+    else:
+        behind += trailing
+    if best.structure.name in PLAIN:
+        return fitted
+    for fit in behind:
+        fewer = best.structure.parameters - fit.structure.parameters
+        if fewer <= 0 or fit.structure.name in PLAIN:  # plain ones are far behind a rich one
+            continue
+        most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+        for mode, problem in problems.items():
+            one = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=most)
+            if not one.converged and one.objective < TWICE**2 * least:
+                one = refit_between(problem, one, mode, mode, hopeless=most)
+            fitted.append((mode, one))
+    return fitted
