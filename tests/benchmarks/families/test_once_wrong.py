@@ -32,6 +32,8 @@ from tests_support import in_studies
         ("two inputs, drift", 881, 35),  # a free response begins as a warm-up does
         ("two inputs, mid-sweep", 883, 38),  # a drift stands for what the record begins with
         ("two inputs, missing", 883, 9),  # few samples are known, and early ones
+        ("two inputs, missing", 1013, 41),  # few samples that answer known input tell less than all
+        ("by chance, more", 1021, 66),  # the plain fit forgets sooner than the washout does
         ("by chance", 1001, 24),  # a fifth pole stands for a linear input
         ("by chance", 1001, 36),  # and zeros do
         ("by chance, more", 1001, 56),  # what is left of a drift counts as noise

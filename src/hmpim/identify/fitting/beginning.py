@@ -64,11 +64,28 @@ def count_in(
     counted[: begins or 0] = False
     counted[n - ahead :] = False
     if known is not None:
-        clear = counted & _unaffected(known, _memory(fits))
-        few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
-        if not few and _stands_out(fit.residual, counted & ~clear, clear):
-            counted = clear  # else what was filled in is part of the noise
+        counted = _of_measured(fit, fit.residual, counted, known)
     return Seen(valid=counted, begins=begins)
+
+
+def _of_measured(fit: Fit, residual: Real, counted: Mask, known: Mask) -> Mask:
+    """Samples that count and answer `known` input alone, where they tell more than all.
+
+    The others count as long as they hold no more than noise, or so little more that fewer samples
+    with less noise would tell less: what was filled in is part of the noise.
+    """
+    reach = min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, residual.size // 4)
+    while True:
+        clear = counted & _unaffected(known, reach)
+        worth = _precision(residual[clear]) > _precision(residual[counted])
+        if not worth or not _stands_out(residual, counted & ~clear, clear):
+            return counted
+        counted, reach = clear, 2 * reach
+
+
+def _precision(residual: Real) -> float:
+    """Samples over their mean square: an estimate's variance is inverse to it."""
+    return residual.size**2 / max(float(np.sum(residual**2)), np.finfo(float).tiny)
 
 
 def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
@@ -119,7 +136,9 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     return begins if statistic > limit else None
 
 
-def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool) -> Seen | None:
+def look_again(
+    problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool, known: Mask | None
+) -> Seen | None:
     """Samples that count after all, now that the structure is known; None if they are the same.
 
     What a band-limited input does at the ends of a record is not known: a command that starts from
@@ -140,6 +159,8 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
         As for `begins_of`.
     rests : bool
         Whether it is known from this fit that the record begins at rest.
+    known : ndarray of bool, shape (n,), or None
+        Samples at which the input was measured; None when all are.
     """
     count = problem.y.size
     told = _counts(problem)
@@ -153,6 +174,10 @@ def look_again(problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: b
         if _stands_out(innovations, told & ringing, told & ~ringing):
             ringing = _until_quiet(innovations, told, ringing, trial.fit.delay, reach)
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
+    if known is not None:
+        clear = _of_measured(trial.fit, trial.fit.residual, told, known)
+        if clear is not told:
+            return replace(seen, valid=clear)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
     if rests:
@@ -255,12 +280,6 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
     white = are_white(np.where(some[out], 0.0, innovations[out]))
     out[out] = white | (held > TWICE * limit)[out]
     return out
-
-
-def _memory(fits: list[Fit]) -> int:
-    """Samples after which the output has forgotten its input, by the best fit so far."""
-    fit = min(fits, key=lambda f: f.objective)
-    return min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, fit.residual.size // 4)
 
 
 def _ahead(fits: list[Fit]) -> int:
