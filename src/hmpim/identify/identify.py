@@ -18,6 +18,7 @@ from hmpim.identify.asked.refusals import (
     checked_structures,
 )
 from hmpim.identify.coupling.responses import inputs_of
+from hmpim.identify.fits import fit
 from hmpim.identify.judgement import judged
 from hmpim.identify.kept import keeping
 from hmpim.identify.pair import Described, describe, describe_dead
@@ -26,7 +27,6 @@ from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.steps import (
     drift_or_levels,
-    fit,
     let_gain_change,
     limit_speed,
     look,

@@ -37,6 +37,8 @@ from tests_support import in_studies
         ("by chance", 1001, 24),  # a fifth pole stands for a linear input
         ("by chance", 1001, 36),  # and zeros do
         ("by chance, more", 1001, 56),  # what is left of a drift counts as noise
+        ("by chance, two inputs", 1021, 28),  # plain dynamics and a drift stand for a washout
+        ("by chance, two inputs", 1021, 72),  # and for the free response that it begins with
         ("by chance", 1003, 22),  # a sequence went to and fro in a gap
         *in_studies(
             ("Bessel", 222, 0),  # a linear input stands in for a third pole

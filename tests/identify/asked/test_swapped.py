@@ -108,7 +108,7 @@ def test_it_is_said_first_and_nothing_is_ok(field_record):
 
 def test_swapped_columns_cost_no_richer_fits(field_record, monkeypatch):
     """Said at once: only the plain structures are tried, and no drift."""
-    module = import_module("hmpim.identify.steps")
+    module = import_module("hmpim.identify.fits")
     asked = []
     fit = module.fit_together
 

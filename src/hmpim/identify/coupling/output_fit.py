@@ -11,26 +11,29 @@ that inputs that resemble each other widen them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import covariances, derivatives, own_lag
+from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
 from hmpim.identify.coupling.left import misfit_at_any_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
+from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import bridged
+from hmpim.identify.fitting.data import Seen
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
@@ -38,7 +41,7 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "fit_together"]
+__all__ = ["OutputFit", "fit_together", "set_free"]
 
 _TURNS = 3
 """How often the strong inputs are fitted, each with the others known."""
@@ -177,6 +180,54 @@ def fit_together(
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
+
+
+def set_free(
+    fitted: OutputFit, inputs: list[Real], y: Real, asked: int, nuisance: Real | None
+) -> OutputFit | None:
+    """The same dynamics from a state that is free; None unless that leaves white noise.
+
+    Parameters
+    ----------
+    fitted : OutputFit
+        As it ended beside other rows.
+    inputs, y, nuisance
+        As for `fit_together`.
+    asked : int
+        The input that may have moved before the record; others may if they move from its start.
+    """
+    fits = {j: fit for j, fit in enumerate(fitted.fits) if fit.related}
+    if asked not in fits or fits[asked].best.fit.structure.integrators:
+        return None
+    valid = common(fit.problem.valid for fit in fits.values())
+    latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
+    counted = begin_at(Seen(valid=valid, begins=None), max(latest, 0) + REACH, y.size)
+    if counted is None:
+        return None
+
+    def freed(j: int, fit: JointFit) -> JointFit:
+        moves = j == asked or in_motion(inputs[j])
+        begins = counted.begins if moves else None
+        problem = replace(fit.problem, valid=counted.valid, nuisance=nuisance, begins=begins)
+        beside = np.zeros(0 if nuisance is None else len(nuisance))
+        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=beside))
+        first = counted.first or 0
+        return replace(fit, problem=problem, best=best, trials=(best,), forgotten=first)
+
+    strong = [j for j, one in enumerate(fitted.strong) if one]
+    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), aside={})
+    for j, fit in enumerate(fitted.fits):
+        pairs.put(j, freed(j, fit))
+    pairs.refine(pairs.kept, None)
+    found = pairs.fits[asked]
+    if not found.best.fit.is_white:
+        washed = washed_out(found.problem, found.best.fit)
+        if washed is None:
+            return None
+        best = replace(found.best, fit=washed)
+        pairs.put(asked, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
+        pairs.refine(pairs.kept, None)
+    return _moved_at_once(pairs) if pairs.fits[asked].best.fit.is_white else None
 
 
 def _moved_at_once(pairs: Pairs) -> OutputFit:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.fit import FORGETS, Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
@@ -24,11 +24,20 @@ def gain_by_rows(one: JointFit, count: int, former: Fit, without: Problem) -> fl
             counts &= problem.valid
     if not counts.any():
         return -np.inf
-    fit = one.best.fit
+    fit, samples = one.best.fit, int(np.count_nonzero(counts))
     gained = 2.0 * innovation_gain(former.residual[counts], fit.residual[counts])
-    unknown = fit.structure.parameters + fit.initial.size + count
-    unknown -= former.structure.parameters + former.initial.size
-    return gained - unknown * float(np.log(counts.sum()))
+    unknown = fit.structure.parameters + count - former.structure.parameters
+    states = _price_of_state(fit, samples) - _price_of_state(former, samples)
+    return gained - unknown * float(np.log(samples)) - states
+
+
+def _price_of_state(fit: Fit, samples: int) -> float:
+    """What Schwarz's criterion asks for a free response: a mode is seen for as long as it lasts."""
+    if not fit.initial.size:
+        return 0.0
+    rates = np.abs(np.polynomial.polynomial.polyroots(fit.denominator).real)
+    lasting = FORGETS / np.maximum(rates, FORGETS / samples)
+    return float(np.sum(np.log(np.maximum(lasting, 1.0))))
 
 
 def without_rows(joint: JointFit, which: slice) -> JointFit:

@@ -89,7 +89,7 @@ def with_drift(
         argument is true.
     steadily : callable
         Makes of a joint fit beside a drift the same with a constant bias, from a state that is
-        free; None if that does not leave white noise.
+        free, or with a washout; None if neither leaves white noise.
 
     Returns
     -------
@@ -120,16 +120,16 @@ def with_drift(
         gain, least = gained(joint)
         if gain < least:
             return first, None
-    steady, rows = steadily(joint), len(columns)
-    if steady and gain_by_rows(joint, rows, steady.best.fit, steady.problem) < 0.0:
-        return steady, None
-    drifting = _described(joint, columns, rival=first.best.fit if gain < 2 * LIKELIER else None)
-    return drifting.joint, drifting
+    rival = first.best.fit if gain < 2 * LIKELIER else None
+    return _unless_steady(joint, columns, steadily, rival)
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, fitted: Callable[[Real, bool], JointFit]
-) -> Drifting | None:
+    problem: Problem,
+    fit: Fit,
+    fitted: Callable[[Real, bool], JointFit],
+    steadily: Callable[[JointFit], JointFit | None],
+) -> tuple[JointFit, Drifting | None] | None:
     """Add a drift to plain dynamics; keep it if white noise is left.
 
     Parameters
@@ -139,12 +139,18 @@ def with_plain_drift(
     fitted : callable
         Makes the joint fit of the plain structures with rows for the drift; if the second argument
         is true, whether it leaves white noise is all that is asked.
+    steadily : callable
+        As for `with_drift`.
 
     Returns
     -------
-    Drifting or None
-        None where a constant bias serves, where the model that it is added to is slow itself, and
-        where more than white noise is left.
+    joint : JointFit
+        The fit that serves, beside the drift or with a constant bias.
+    drifting : Drifting or None
+        None where a free response is all that drifts.
+
+    None where a constant bias serves, where the model that a drift is added to is slow itself, and
+    where more than white noise is left.
     """
     columns = _polynomials(problem.y.size, _DEGREES[-1])
     joint = fitted(columns, True)
@@ -158,7 +164,21 @@ def with_plain_drift(
     gain = gain_by_rows(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
-    return _described(joint, columns, rival=fit if gain < 2 * LIKELIER else None)
+    return _unless_steady(joint, columns, steadily, fit if gain < 2 * LIKELIER else None)
+
+
+def _unless_steady(
+    joint: JointFit,
+    columns: Real,
+    steadily: Callable[[JointFit], JointFit | None],
+    rival: Fit | None,
+) -> tuple[JointFit, Drifting | None]:
+    """The fit beside a drift, or that with a constant bias which explains as much."""
+    steady = steadily(joint)
+    if steady and gain_by_rows(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
+        return steady, None
+    drifting = _described(joint, columns, rival=rival)
+    return drifting.joint, drifting
 
 
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:

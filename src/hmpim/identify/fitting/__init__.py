@@ -13,6 +13,7 @@ beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials, and whether whitening may be trusted
 trial           what was tried, and what is chosen of it
 plainer         a plain structure beside a rich one
+washout         a washout in place of a drift
 nested          one pole or two: what the record cannot tell
 unrelated       whether an output follows its input at all
 halves          whether the halves of a record agree

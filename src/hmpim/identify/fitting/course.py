@@ -25,6 +25,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -307,14 +308,18 @@ def set_free(course: Course, fit: Fit) -> Course | None:
     course : Course
         The plain fits so far.
     fit : Fit
-        Of any structure, as it ended beside other rows.
+        Of any structure, as it ended beside other rows. What drifted may be its free response, or
+        that of a washout.
     """
     data, given = course.data, course.given
     counted = begin_at(given, max(int(np.ceil(fit.delay)), 0) + REACH, data.y.size)
-    if counted is None or not fit.structure.order or fit.structure.integrators:
+    if counted is None or fit.structure.integrators:
         return None
-    free = refit(data.problem(course.natural, counted), fit)
-    if not free.is_white:
+    problem = data.problem(course.natural, counted)
+    free: Fit | None = refit(problem, fit) if fit.structure.order else None
+    if free is None or not free.is_white:
+        free = washed_out(problem, fit)
+    if free is None or not free.is_white:
         return None
     return replace(course, others=(), counted=counted, fits=[free], settled=None)
 

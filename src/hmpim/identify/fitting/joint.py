@@ -153,9 +153,7 @@ def weigh_and_look_again(
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
         rests = best.fit is course.settled
-        again = look_again(
-            problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known
-        )
+        again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known)
         natural = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if natural else None
         if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
