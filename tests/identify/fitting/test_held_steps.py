@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.fitting.fit import Problem
+from hmpim.identify.fitting.fit import Problem, bounded_for
 from hmpim.identify.fitting.held_steps import at_ends, kept_in_sample, steps_through
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.model import STRUCTURES, prepare_input
@@ -85,3 +85,15 @@ def test_a_start_far_outside_the_record_is_brought_inside():
     problem = Problem(source=prepare_input(u, "zoh"), y=u, valid=None, longest_delay=50.0)
     kept = kept_in_sample(problem, STRUCTURES["washout"], np.array([-2e9, 3.0]))
     assert kept.shortest_delay == kept.longest_delay == np.floor(problem.shortest_delay) + 0.5
+
+
+@pytest.mark.parametrize(("mode", "kept"), [("zoh", False), ("bandlimited", True)])
+def test_a_mode_that_samples_of_a_held_response_show_as_its_alias_is_slower(mode, kept):
+    structure, fast = STRUCTURES["second_order"], np.array([4.3, np.log(0.05), 10.0])
+    source = prepare_input(HELD, mode)
+    problem = Problem(source=source, y=0.0 * HELD, valid=None, longest_delay=50.0)
+    bounded = bounded_for(problem, structure, fast.copy())
+    lag, shape = np.exp(bounded[1]), bounded[2]
+    poles = np.roots([shape * lag**2, lag, 1.0])
+    assert np.array_equal(bounded, fast) == kept
+    assert (np.abs(poles.imag).max() <= np.pi + 1e-9) != kept

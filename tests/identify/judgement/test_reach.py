@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy
 
+import hmpim
 from hmpim.identify.judgement.reach import (
     beyond_band,
     fast_mode,
@@ -165,3 +166,17 @@ def test_a_window_is_what_neighbouring_bins_add(samples):
     level = (u - window @ u / window.sum()) * window
     wanted = np.abs(scipy.fft.rfft(level)) ** 2 * 2.0 / (window @ window * samples)
     assert windowed_power(u) == pytest.approx(wanted, rel=1e-9, abs=1e-14 * wanted.max())
+
+
+@pytest.mark.parametrize(("start", "doubted"), [(0, False), (400, True)])
+def test_what_an_integrator_had_before_the_record_is_part_of_its_bias(start, doubted):
+    """From rest the input is none before the first sample; else the noise may hide what moved."""
+    rng = np.random.default_rng(2)
+    u = np.convolve(rng.standard_normal(2400), np.hanning(9) / 4, "same")
+    u[:200] = 0.0
+    y = 0.01 * np.cumsum(u) + 0.05 * rng.standard_normal(u.size)
+    record = hmpim.Record.from_arrays({"u": u[start:]}, {"y": y[start:]}, fs=100.0)
+    pair = hmpim.identify(record, structures=["integrator"]).pairs[0]
+    codes = {w.code for w in pair.warnings if "bias" in w.parameters and w.severity == "doubt"}
+    assert pair.structure == "integrator"
+    assert ("initial_transient" in codes) == doubted

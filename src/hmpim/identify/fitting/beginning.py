@@ -77,8 +77,10 @@ def _of_measured(fit: Fit, residual: Real, counted: Mask, known: Mask) -> Mask:
     reach = min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, residual.size // 4)
     while True:
         clear = counted & _unaffected(known, reach)
-        worth = _precision(residual[clear]) > _precision(residual[counted])
-        if not worth or not _stands_out(residual, counted & ~clear, clear):
+        few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
+        if few or _precision(residual[clear]) <= _precision(residual[counted]):
+            return counted
+        if not _stands_out(residual, counted & ~clear, clear):
             return counted
         counted, reach = clear, 2 * reach
 

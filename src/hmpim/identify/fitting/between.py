@@ -1,12 +1,16 @@
 """Fits under each assumption between the samples, from where they ended under another."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.candidates import best_of
 from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Seen, shifted
-from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.enrich import PLAIN, RICH, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.worth import TWICE
+from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["fit_under_each_assumption", "refit_between"]
@@ -27,12 +31,19 @@ def refit_between(
 
 
 def fit_under_each_assumption(
-    data: Data, natural: Intersample, fits: list[Fit], seen: Seen, *, alone: bool
+    data: Data,
+    natural: Intersample,
+    fits: list[Fit],
+    seen: Seen,
+    structures: tuple[StructureName, ...],
+    *,
+    alone: bool,
 ) -> list[tuple[Intersample, Fit]]:
     """Add to fits under the natural assumption those under the others, unless it stands alone.
 
     Poles and zeros of a rich one may have made up for a wrong assumption: plainer ones are fitted
-    under the others as far as they may be about as likely.
+    under the others as far as they may be about as likely, also those of `structures` that have the
+    poles of one that was fitted, and other zeros.
     """
     fitted = [(natural, fit) for fit in fits]
     if alone:
@@ -75,4 +86,22 @@ def fit_under_each_assumption(
             if not one.converged and one.objective < TWICE**2 * least:
                 one = refit_between(problem, one, mode, mode, hopeless=most)
             fitted.append((mode, one))
+    for start in _with_other_zeros(fits, structures):
+        if start.structure.parameters < best.structure.parameters:
+            for mode, problem in problems.items():
+                starts = [start.theta, shifted(start.theta, natural, mode)]
+                fitted.append((mode, best_of(problem, start.structure, starts, [best])))
     return fitted
+
+
+def _with_other_zeros(fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
+    """Starts of structures that were not fitted, at the poles of the best that has as many."""
+    tried = {fit.structure for fit in fits}
+    starts = []
+    for structure in members(structures, RICH):
+        alike = [f for f in fits if f.structure.sections == structure.sections]
+        alike = [f for f in alike if f.structure.integrators == structure.integrators]
+        if structure not in tried and alike and not structure.parallel:
+            best = min(alike, key=lambda fit: fit.objective)
+            starts.append(replace(best, structure=structure))
+    return starts

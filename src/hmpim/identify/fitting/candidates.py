@@ -34,6 +34,7 @@ from hmpim.model.response import slowest_time_constant
 
 __all__ = [
     "almost_integrates",
+    "best_of",
     "fit_integrating",
     "fit_plain",
     "fit_rich",
@@ -201,7 +202,7 @@ def _climbed(
         rivals = [*fits, *found]
         starts = [*p.starts, *_grown(p.structure, rivals)]
         far_off = misled and is_poor(min(rivals, key=lambda f: f.objective), problem.spread)
-        return _best_of(problem, p.structure, starts, rivals, far_off=far_off)
+        return best_of(problem, p.structure, starts, rivals, far_off=far_off)
 
     def explains(fit: Fit) -> bool:
         return owed_to_input(problem, fit, data) <= MATERIAL and fit.is_white
@@ -253,7 +254,7 @@ def fit_integrating(
             rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
         rivals = [*fits, *found]
         starts = [*_grown(structure, rivals), *integrator_starts(rough, structure)]
-        found.append(_best_of(problem, structure, starts, rivals))
+        found.append(best_of(problem, structure, starts, rivals))
     return found
 
 
@@ -309,7 +310,7 @@ def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, .
         hopeless = TWICE * least
         taste = fit_structure(problem, structure, start, iterations=TASTE, hopeless=hopeless)
         if taste.objective < hopeless:
-            fit = _best_of(problem, structure, [taste.theta], near)
+            fit = best_of(problem, structure, [taste.theta], near)
             if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
                 found.append(fit)
     return found
@@ -338,7 +339,7 @@ def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     ]
 
 
-def _best_of(
+def best_of(
     problem: Problem,
     structure: Structure,
     starts: list[Real],

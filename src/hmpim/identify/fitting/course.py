@@ -327,7 +327,12 @@ def set_free(course: Course, fit: Fit) -> Course | None:
 def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
     """The fits, and the leading ones under the other assumptions between the samples."""
     return fit_under_each_assumption(
-        course.data, course.natural, course.fits, course.counted, alone=course.alone
+        course.data,
+        course.natural,
+        course.fits,
+        course.counted,
+        course.others,
+        alone=course.alone,
     )
 
 

@@ -8,6 +8,7 @@ closed form. One input or several, with a drift or without, from rest or in mid-
 one optimiser.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, singledispatch
@@ -261,7 +262,8 @@ class _Evaluation:
 def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:
     """Keep delay and time constants where the record can tell them."""
     delays = (problem.shortest_delay, problem.longest_delay)
-    return within_reach(structure, theta, delays=delays, samples=problem.source.samples)
+    bounded = within_reach(structure, theta, delays=delays, samples=problem.source.samples)
+    return _below_nyquist(structure.sections, bounded) if problem.source.degree == 0 else bounded
 
 
 @singledispatch
@@ -304,6 +306,22 @@ def within_reach(
     bounded = np.minimum(np.maximum(theta, least), most)
     bounded[0] = min(max(theta[0], delays[0]), delays[1])
     return bounded
+
+
+def _below_nyquist(sections: tuple[int, ...], theta: Real) -> Real:
+    """Keep oscillating modes slower than half the sampling rate.
+
+    Samples of a response to a held input show a faster one as its alias: at the sampling rate a
+    real pole. `theta` is changed in place.
+    """
+    at = 1
+    for order in sections:
+        if order == 2 and theta[at + 1] > 0.25:  # poles (-1 ± sqrt(1 - 4 q)) / (2 q T)
+            shape = float(theta[at + 1])
+            fastest = math.sqrt(4.0 * shape - 1.0) / (2.0 * shape * math.pi)
+            theta[at] = max(theta[at], math.log(max(fastest, _SHORTEST_TIME_CONSTANT)))
+        at += order
+    return theta
 
 
 @lru_cache(maxsize=256)

@@ -5,15 +5,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.special
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.fitting.beginning import in_motion
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
-from hmpim.identify.worth import DEEPEST, FEW, PAST, ROUNDING, TWICE
+from hmpim.identify.worth import DEEPEST, FEW, PART, PAST, ROUNDING, TWICE
 from hmpim.model import response
 from hmpim.record import Finding
 from hmpim.record.runs import runs_of
@@ -63,6 +66,14 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
     """
     joint, fit = evidence.joint, evidence.joint.best.fit
     if not joint.forgotten:
+        if fit.structure.integrators and _may_have_moved(evidence):
+            yield Finding(
+                code="initial_transient",
+                message="The input is not at rest in the first sample. What the output had "
+                "integrated before is part of the bias, unless the unit was at rest.",
+                severity="doubt",
+                parameters=("bias",),
+            )
         return
     first = f"first {joint.forgotten / evidence.fs:.4g} s"
     message = (
@@ -84,6 +95,23 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
         severity="doubt" if doubted else "info",
         parameters=doubted,
     )
+
+
+def _may_have_moved(evidence: Evidence) -> bool:
+    """Whether the output may have moved before the record, and the noise would hide it.
+
+    Until the delay is over it would go on as it does elsewhere.
+    """
+    u = evidence.u
+    if not u.size or not (in_motion(u) or u[0] ** 2 > PART * float(np.mean(u**2))):
+        return False
+    fit = evidence.joint.best.fit
+    late = int(fit.delay)
+    if late < 1:
+        return True
+    motion = np.mean((fit.prediction[late:] - fit.prediction[:-late]) ** 2)
+    noise = float(np.mean(fit.residual**2)) * float(scipy.special.chdtri(late, FALSE_ALARM))
+    return bool(PART * late * motion < noise)
 
 
 def fast_mode(evidence: Evidence) -> Iterator[Finding]:
