@@ -1,8 +1,11 @@
 """Draws that were called ok and were wrong, one for each mechanism that mends them."""
 
+import numpy as np
 import pytest
-from families.catalogue import FAMILIES
+from families.catalogue import BESIDE_ANOTHER, FAMILIES
+from families.kinds import lagging_integrator, sequence
 from families.study import draw_of, identified, one
+from families.take import finish, shoot
 
 from tests_support import in_studies
 
@@ -92,3 +95,16 @@ def test_the_scale_of_a_record_of_120_db_holds(index):
     draw = draw_of(FAMILIES["clean"], 404, index)
     low, high = identified(draw).pairs[0].parameters.scale_factor.ci95
     assert low < draw.figures["scale_factor"].value < high
+
+
+def test_an_integrator_is_found_beside_another_input():
+    """A sum correlates little with its input, and its pole is as slow as the record, as a drift."""
+    rng = np.random.default_rng(3)
+    drive = sequence("fast_prbs")(rng)
+    take = shoot(rng, lagging_integrator(rng, drive), drive, snr_db=40.0)
+    BESIDE_ANOTHER(take)
+    draw = finish(take)
+    pair = identified(draw).pairs[0]
+    truth = draw.figures["scale_factor"].value
+    assert pair.structure.startswith("integrator")
+    assert pair.scale_factor.value == pytest.approx(truth, rel=0.02)

@@ -22,7 +22,7 @@ from hmpim.identify.coupling.joint_errors import common, covariances, derivative
 from hmpim.identify.coupling.left import misfit_at_any_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
-from hmpim.identify.effects.drift import Drifting
+from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
@@ -268,7 +268,9 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
     """Fit, in place, the input that the output follows most."""
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
-    tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in _likely(share)}
+    sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
+    likely = [*_likely(share), *(_likely(sums) if sums else ())]
+    tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
     pairs.put(i, tried[i])
     pairs.strong.append(i)
@@ -277,7 +279,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit, in place, inputs that much of what is left over follows, the strongest first."""
     tried: dict[int, JointFit] = {}
-    share = _shares(inputs, pairs)
+    share, summed = _shares(inputs, pairs)
     while share:
         counted = pairs.counted(pairs.strong)
         likely = _likely(share)
@@ -286,16 +288,19 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and _is_followed(tried[i]):
+        if _is_large(tried[i]) and (
+            _is_followed(tried[i]) or (i in summed and _is_summed(inputs[i], tried[i], fitted))
+        ):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
-            tried, share = {}, _shares(inputs, pairs)  # what is left is clearer now
+            tried, (share, summed) = {}, _shares(inputs, pairs)  # what is left is clearer now
 
 
-def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
-    """Share (r.m.s.) of what is left over that correlates with each input, where it is much.
+def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
+    """Amplitude (r.m.s.) that correlates with an input, or its sum, where it is much of the rest.
 
+    And the inputs of which it is the sum alone.
     Friction correlates with an input that does not cause it; what follows one does so over all its
     band.
     """
@@ -304,14 +309,32 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
         counted = pairs.valid  # nothing is told of what is hardly seen
     constant = constant_of(pairs.fits[pairs.strong[0]])
-    found, rare = {}, FALSE_ALARM / max(len(waiting), 1)
+    found: dict[int, float] = {}
+    sums: set[int] = set()
+    rare = FALSE_ALARM / max(len(waiting), 1)
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
-        share = _follows_at_all(inputs[j], rest) / max(float(np.std(rest)), 1e-300)
-        band = excited_band(inputs[j], 1.0)
-        if share > PART and misfit_at_any_lag(inputs[j], rest, band).probability < rare:
+        least = PART * max(float(np.std(rest)), 1e-300)
+        share = _follows_at_all(inputs[j], rest)
+        if share > least:
+            band = excited_band(inputs[j], 1.0)
+            if misfit_at_any_lag(inputs[j], rest, band).probability < rare:
+                found[j] = share
+        elif (share := _sum_in(inputs[j], rest, rare)) > least:
             found[j] = share
-    return found
+            sums.add(j)
+    return found, sums
+
+
+def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
+    """Amplitude (r.m.s.) of an output that correlates with an input's sum; 0 if by chance.
+
+    A sum shows the input in its increments, which of a drift are small.
+    """
+    moves = np.diff(rest, prepend=rest[0])
+    if misfit_at_any_lag(u, moves, excited_band(u, 1.0)).probability >= rare:
+        return 0.0
+    return _follows_at_all(np.cumsum(u - u.mean()), rest)
 
 
 def _likely(share: Mapping[int, float]) -> list[int]:
@@ -337,9 +360,25 @@ def _is_followed(tried: JointFit) -> bool:
     A pole as slow as the record explains a drift as well, and what answers late enough to leave
     out most of the record explains what the stronger inputs' models lack, such as friction.
     """
-    problem, fit = tried.problem, tried.best.fit
-    late = max(fit.delay, problem.begins or 0)
-    return tried.related and not spans_record(fit) and bool(late < MOST * problem.y.size)
+    return not spans_record(tried.best.fit) and _is_in_time(tried)
+
+
+def _is_summed(u: Real, tried: JointFit, fitted: Callable[..., JointFit]) -> bool:
+    """Whether what is left over follows the sum of an input: a drift explains less."""
+    if not _is_in_time(tried):
+        return False
+    problem = tried.problem
+    rows = drift_rows(problem.y.size)
+    rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
+    beside = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
+    return spans_record(beside) or tried.best.fit.cost < beside.cost
+
+
+def _is_in_time(tried: JointFit) -> bool:
+    """Whether an output answers an input, over most of the record."""
+    problem = tried.problem
+    late = max(tried.best.fit.delay, problem.begins or 0)
+    return tried.related and bool(late < MOST * problem.y.size)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

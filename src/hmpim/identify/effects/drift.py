@@ -30,7 +30,7 @@ from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import MOST, PART, TWICE
 from hmpim.record import Finding
 
-__all__ = ["Drifting", "drift_findings", "is_slow", "with_drift", "with_plain_drift"]
+__all__ = ["Drifting", "drift_findings", "drift_rows", "is_slow", "with_drift", "with_plain_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
 """Degrees of the polynomial that are weighed against each other."""
@@ -101,7 +101,7 @@ def with_drift(
     """
     if not _asked_for(first):
         return first, None
-    every = _polynomials(first.problem.y.size, _DEGREES[-1])
+    every = drift_rows(first.problem.y.size)
     joint = fitted(every, True)
     plainly = is_white(joint.best.fit.residual)
     if not plainly:  # else the drift takes the shape of missing dynamics
@@ -152,7 +152,7 @@ def with_plain_drift(
     None where a constant bias serves, where the model that a drift is added to is slow itself, and
     where more than white noise is left.
     """
-    columns = _polynomials(problem.y.size, _DEGREES[-1])
+    columns = drift_rows(problem.y.size)
     joint = fitted(columns, True)
     told = joint.problem.counted
     if told < max(_FEWEST, MOST * problem.counted) or not is_white(joint.best.fit.residual):
@@ -244,7 +244,7 @@ def is_slow(problem: Problem, fit: Fit) -> bool:
 
 def _steepness(residual: Real) -> float:
     """Mean power of the four slowest polynomials over that of bins 8 to 40."""
-    columns = _polynomials(residual.size, _DEGREES[-1])
+    columns = drift_rows(residual.size)
     columns = columns / np.linalg.norm(columns, axis=1)[:, None]
     weights = columns @ (residual - residual.mean())
     power = (
@@ -254,10 +254,10 @@ def _steepness(residual: Real) -> float:
     return float(np.mean(weights[:4] ** 2)) / max(level, np.finfo(float).tiny)
 
 
-def _polynomials(size: int, degree: int) -> Real:
-    """Legendre polynomials 1 … degree over the record, zero on average, shape (degree, n)."""
+def drift_rows(size: int) -> Real:
+    """Rows of any drift that is looked for: Legendre polynomials, zero on average, shape (k, n)."""
     at = (2.0 * np.arange(size) + 1.0 - size) / size
-    columns = legvander(at, degree).T[1:]
+    columns = legvander(at, _DEGREES[-1]).T[1:]
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
