@@ -48,6 +48,9 @@ _SHORTEST_TIME_CONSTANT = 0.02
 _SHAPES = (1e-4, 1e6)
 """Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
 
+_CRITICAL = 0.25
+"""1 / (4ζ²) at critical damping, above which poles oscillate."""
+
 FORGETS = 5.0
 """Time constants after which what came before is forgotten (0.7 % left)."""
 
@@ -316,7 +319,7 @@ def _below_nyquist(sections: tuple[int, ...], theta: Real) -> Real:
     """
     at = 1
     for order in sections:
-        if order == 2 and theta[at + 1] > 0.25:  # poles (-1 ± sqrt(1 - 4 q)) / (2 q T)
+        if order == 2 and theta[at + 1] > _CRITICAL:  # poles (-1 ± sqrt(1 - 4 q)) / (2 q T)
             shape = float(theta[at + 1])
             fastest = math.sqrt(4.0 * shape - 1.0) / (2.0 * shape * math.pi)
             theta[at] = max(theta[at], math.log(max(fastest, _SHORTEST_TIME_CONSTANT)))
