@@ -101,7 +101,7 @@ def _with_other_zeros(fits: list[Fit], structures: tuple[StructureName, ...]) ->
     for structure in members(structures, RICH):
         alike = [f for f in fits if f.structure.sections == structure.sections]
         alike = [f for f in alike if f.structure.integrators == structure.integrators]
-        if structure not in tried and alike and not structure.parallel:
+        if structure not in tried and alike and not structure.dc_zeros:
             best = min(alike, key=lambda fit: fit.objective)
             starts.append(replace(best, structure=structure))
     return starts
