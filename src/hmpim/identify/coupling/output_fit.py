@@ -269,7 +269,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
-    likely = [*_likely(share), *(_likely(sums) if sums else ())]
+    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once
     tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
     pairs.put(i, tried[i])
@@ -339,7 +339,8 @@ def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
 
 def _likely(share: Mapping[int, float]) -> list[int]:
     """Inputs that may be the strongest: a delayed copy of one correlates as well."""
-    return [j for j, one in share.items() if one >= NEARLY * max(share.values())]
+    most = max(share.values(), default=0.0)
+    return [j for j, one in share.items() if one >= NEARLY * most]
 
 
 def _is_large(fit: JointFit) -> bool:
