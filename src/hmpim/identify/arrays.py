@@ -1,4 +1,4 @@
-"""The arrays of identification: samples, spectra, and which samples count."""
+"""Array types of identification, and fast medians and moving averages."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,13 @@ Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
 _BULK = 60_000
-"""Samples that tell the size of the bulk of a record, to half a per cent."""
+"""Samples from which the size of the bulk of a record is known to half a per cent."""
 
 
 def median(values: Real) -> float:
-    """Return the median of a few numbers, shape (m,), m > 0: `np.median`, in a sixth of its time.
+    """Median of a few numbers, shape (m,), m > 0, in a sixth of the time of `np.median`.
 
-    NaN if one of them is.
+    It is NaN if one of them is.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def median(values: Real) -> float:
 def averaged(values: Real, reach: int | NDArray[np.int64]) -> Real:
     """Average along the last axis over neighbours within reach on either side, fewer at the ends.
 
-    The reach is one for all, or one for each, (m,).
+    The reach is one number, or one for each value, (m,).
 
     Examples
     --------
@@ -51,7 +51,7 @@ def averaged(values: Real, reach: int | NDArray[np.int64]) -> Real:
 
 
 def every_of(samples: int) -> int:
-    """Samples from one to the next of those, evenly spread, that tell the size of their bulk.
+    """Step between evenly spread samples that suffice to estimate the size of the bulk.
 
     Examples
     --------

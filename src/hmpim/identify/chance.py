@@ -1,12 +1,12 @@
-"""The two chances that decisions rest on.
+"""The two probabilities behind all decisions.
 
-A test holds a record against what a model supposes, and accuses it where what is seen would come
-by chance in fewer than `FALSE_ALARM` of the records that are as supposed. A record meets about
-twenty tests: of five hundred sound ones, one is accused. Where a test asks many questions at once
-the rate is shared among them (C. E. Bonferroni, 1936).
+A test compares a record with the assumptions of a model, and rejects them if the observation would
+occur by chance in fewer than `FALSE_ALARM` of the records that satisfy them. A record meets about
+twenty tests, so one sound record in five hundred is rejected. A test of many hypotheses at once
+shares the rate among them (C. E. Bonferroni, 1936).
 
-Intervals hold the truth in `COVERAGE` of the records. What such an interval does not exclude is
-excluded nowhere: neither one more pole, nor another assumption between the samples.
+Intervals contain the truth in `COVERAGE` of the records. Whatever such an interval does not exclude
+is excluded nowhere: neither one more pole nor another assumption between the samples.
 """
 
 import math
@@ -29,26 +29,26 @@ __all__ = [
 ]
 
 FALSE_ALARM = 1e-4
-"""Chance that a test accuses a record which is as the test supposes."""
+"""Probability that a test rejects a record which satisfies its assumptions."""
 
 COVERAGE = 0.95
-"""Share of the intervals that hold the truth."""
+"""Share of the intervals that contain the truth."""
 
 _NORMAL = NormalDist()  # scipy.special would be a third of the time of `import hmpim`
 
 
 def deviations(questions: int = 1) -> float:
-    """Deviations of a normal error that the rate of false alarms allows, on either side.
+    """Two-sided limit of a normal error, in standard deviations, at the rate of false alarms.
 
     Parameters
     ----------
     questions : int
-        How many are asked at once.
+        Number of errors that are tested at once.
 
     Returns
     -------
     float
-        Above it one of them is no chance any more.
+        An error beyond it is not due to chance.
 
     Examples
     --------
@@ -59,19 +59,19 @@ def deviations(questions: int = 1) -> float:
 
 
 DEVIATIONS = deviations(1)
-"""The same of a single question: 3.89."""
+"""The same of a single error: 3.89."""
 
 EXCLUDED = DEVIATIONS**2
-"""Deviance at which the rate of false alarms excludes one parameter less: 15.1."""
+"""Deviance at which the rate of false alarms excludes a model with one parameter less: 15.1."""
 
 
 def searched(alternatives: int) -> float:
-    """Log-likelihood that the likeliest of many alternatives gains as seldom by chance.
+    """Log-likelihood that the best of many alternatives gains by chance as rarely.
 
     Parameters
     ----------
     alternatives : int
-        How many are looked at.
+        How many are compared.
 
     Examples
     --------
@@ -85,13 +85,13 @@ SEARCHED = searched(10_000_000)
 """The same of a search over all delays, frequencies and dynamics: 25.3."""
 
 HALF = _NORMAL.inv_cdf(0.5 + COVERAGE / 2)
-"""Deviations of a normal error on either side that such an interval spans: 1.96."""
+"""Half width of such an interval of a normal error, in standard deviations: 1.96."""
 
 ONE_SIDED = _NORMAL.inv_cdf(COVERAGE)
-"""Deviations that a normal error stays below as often: 1.645."""
+"""One-sided limit of a normal error at the same probability: 1.645."""
 
 SEEN = HALF**2
-"""Twice the log-likelihood that one parameter more gains as seldom by chance: 3.84."""
+"""Twice the log-likelihood that one parameter more gains by chance as rarely: 3.84."""
 
 BULK = _NORMAL.inv_cdf(0.75)
 """Deviations within which half of all normal errors lie: 0.674."""
@@ -100,4 +100,4 @@ LIKELIER = -math.log(1 - COVERAGE)
 """Log-likelihood of the same odds, 20 to 1: 3.0."""
 
 CLEARLY = 2 * LIKELIER
-"""Log-likelihood of those odds twice over, 400 to 1, where two models are weighed: 6.0."""
+"""Log-likelihood of these odds squared, 400 to 1, for comparing two models: 6.0."""

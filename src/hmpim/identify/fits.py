@@ -1,4 +1,4 @@
-"""Fit an output: every structure, with hum, a drift or levels where the residual asks for them."""
+"""Fit an output: all structures, and hum, a drift or levels where the residual requires them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit, fit_together
 from hmpim.identify.coupling.output_fit import set_free as set_all_free
 from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
-from hmpim.identify.effects.hum import line_near, with_hum
+from hmpim.identify.effects.hum import Humming, line_near, with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
     find_imperfections,
@@ -44,14 +44,14 @@ from hmpim.model.dynamics import StructureName
 __all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "started"]
 
 _CLEAR = 8
-"""Bins from a constant to a line: in the window's spectrum each is four wide to either side."""
+"""Bins between a constant and a line: in the window's spectrum each is four wide on either side."""
 
 
 def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
-    """Fit every structure, with hum and a drift where the residual asks for them.
+    """Fit every structure, with hum and a drift where the residual requires them.
 
-    If plain dynamics with levels or with a drift leave white noise, no richer ones are tried: they
-    would only follow the effect. The levels found are returned with the fit.
+    If plain dynamics with levels or with a drift leave white noise, richer ones are not tried: they
+    would only imitate the effect. The levels found are returned with the fit.
     """
     begun = _begin(question, seen)
     if begun is None:
@@ -73,13 +73,13 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
 def _behind_levels(
     question: Question, seen: Imperfections, course: Course, *, rests: bool
 ) -> tuple[Imperfections, OutputFit] | None:
-    """Plain dynamics behind levels, where they leave white noise."""
+    """Plain dynamics followed by saturation, if they leave white noise; None otherwise."""
     best, y = course.best, question.output.values
-    # Of what came before the record these fits know nothing.
+    # These fits ignore any motion before the record.
     late = 0 if rests else min(int(np.ceil(max(best.delay, 0.0) + best.memory)), y.size // 4)
     prediction = np.concatenate([y[:late], best.prediction[late:]])
-    shown = imperfections_of(question, prediction=prediction).saturation
-    levels = seen.saturation if shown is None else shown
+    found = imperfections_of(question, prediction=prediction).saturation
+    levels = seen.saturation if found is None else found
     if levels is None:
         return None
     clipped = replace(seen, saturation=levels)
@@ -94,13 +94,13 @@ def _behind_levels(
     refined = refine(joint, clipped, question.aligned.inputs[0].values, question.aligned.fs)
     if refined is None:
         return None
-    told, _ = refined
-    white = is_white(told.problem.counting(told.best.fit.residual))
+    censored, _ = refined
+    white = is_white(censored.problem.counting(censored.best.fit.residual))
     return (clipped, OutputFit(fits=(joint,))) if white else None
 
 
 def _drifting(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
-    """Plain dynamics and a drift, where they leave white noise."""
+    """Plain dynamics and a drift, if they leave white noise; None otherwise."""
     valid, former = counted_in(question, seen), course
 
     def with_rows(rows: Real, _: bool) -> JointFit:
@@ -119,7 +119,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if found is None or not found[0].related:
         return None
     joint, drifting = found
-    if follows(course.data, joint.best.fit):  # richer dynamics may be what is slow
+    if follows(course.data, joint.best.fit):  # richer dynamics may explain the slow part
         return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
@@ -127,83 +127,100 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
 def _fit_and_look_for_rows(
     question: Question, seen: Imperfections, begun: Course | None = None
 ) -> OutputFit:
-    """Fit every structure, and again with hum and a drift where the residual asks for them."""
+    """Fit every structure, and again with hum and a drift where the residual requires them."""
     steady = question.exact or question.intersample == "sampled"
     drifts = None if steady else partial(_plain_beside_drift, question, seen)
     fitted = fit_once(question, seen, question.structures, begun=begun, drifts=drifts)
-    several = len(fitted.fits) > 1
-    if fitted.drifting is not None:
+    sampled = len(fitted.fits) > 1 and question.intersample == "sampled"
+    if fitted.drifting is not None or fitted.fits[0].silent:
         return fitted
-    if fitted.fits[0].silent or question.swapped or question.exact:
+    if question.swapped or question.exact or sampled:
         return fitted
-    if several and question.intersample == "sampled":
-        return fitted
-    asked = 0
-    if several:
-        slow = fitted.slow
-        asked = fitted.leading if slow is None else slow
-    joint, beside, humming = fitted.fits[asked], fitted, None
-    freed: OutputFit | None = None
-    hum = np.zeros(0)
-    aside: dict[int, JointFit] = {}
+    return _WithRows(question, seen, fitted, begun).found()
 
-    def with_rows(rows: Real, plainly: bool) -> JointFit:
-        nonlocal beside, hum
+
+class _WithRows:
+    """The search for hum and a drift, as rows that are fitted in addition to the bias.
+
+    They are tested with one input, that which leads or may have taken a drift for its own; all
+    inputs are fitted again.
+    """
+
+    def __init__(
+        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
+    ) -> None:
+        self.question, self.seen, self.first, self.begun = question, seen, fitted, begun
+        self.several = len(fitted.fits) > 1
+        slow = fitted.slow if self.several else 0
+        self.asked = fitted.leading if slow is None else slow
+        self.latest = fitted  # with the rows that were tried last
+        self.freed: OutputFit | None = None
+        self.unrelated: dict[int, JointFit] = {}
+        self.humming: Humming | None = None
+        self.hum = np.zeros(0)
+
+    def found(self) -> OutputFit:
+        """The fit with hum and a drift, or without where it does not need them."""
+        joint = self.first.fits[self.asked]
+        coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
+        if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
+            self.humming = with_hum(joint, self.with_rows)
+        steady = self.first if self.humming is None else self.latest
+        before = joint if self.humming is None else self.humming.joint
+        # Only inputs that the output is known to follow are used to test for a drift.
+        unrelated = {i: fit for i, fit in enumerate(steady.fits) if not fit.related}
+        self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
+        joint, drifting = with_drift(before, self.with_rows, self.steadily)
+        if self.unrelated and drifting is not None:
+            self.unrelated = {}
+            joint, drifting = with_drift(before, self.with_rows, self.steadily)
+        humming = self.humming
+        if drifting is not None:
+            steady = self.latest
+            humming = None if humming is None else replace(humming, trend=self.hum)
+        elif self.freed is not None and joint is self.freed.fits[self.asked]:
+            steady = self.freed
+        kept = replace(steady, drifting=drifting, humming=humming, asked=self.asked)
+        if self.several:
+            return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
+        prediction = None if drifting is None else self.first.prediction
+        return replace(kept, fits=(joint,), steady=prediction)
+
+    def with_rows(self, rows: Real, plainly: bool) -> JointFit:
+        """Fit all inputs with rows, and with those of the hum found before."""
+        question, before = self.question, self.latest
         names = question.plain if plainly else question.structures
-        every = rows if humming is None else np.vstack([rows, humming.rows])
-        before, beside = beside, fit_once(question, seen, names, every, aside=aside)
-        if not several and not plainly and before is not fitted:
-            beside = _as_before(question, seen, every, before, beside)
-        found = beside.fits[asked]
-        if humming is None:
+        every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
+        self.latest = fit_once(question, self.seen, names, every, aside=self.unrelated)
+        if not self.several and not plainly and before is not self.first:
+            self.latest = _as_before(question, self.seen, every, before, self.latest)
+        found = self.latest.fits[self.asked]
+        if self.humming is None:
             return found
         quiet = without_rows(found, slice(len(rows), None))
-        hum = found.problem.y - quiet.problem.y
+        self.hum = found.problem.y - quiet.problem.y
         return quiet
 
-    def steadily(drifted: JointFit) -> JointFit | None:
-        nonlocal freed
+    def steadily(self, drifted: JointFit) -> JointFit | None:
+        """The same dynamics with a constant bias, from a state that is free."""
+        question = self.question
         if question.intersample == "sampled":
             return None
-        if several:
-            freed = _all_free(question, beside, asked, None if humming is None else humming.rows)
-            return None if freed is None else freed.fits[asked]
-        course = begun or started(question, seen, None if humming is None else humming.rows)
+        hum = None if self.humming is None else self.humming.rows
+        if self.several:
+            self.freed = _all_free(question, self.latest, self.asked, hum)
+            return None if self.freed is None else self.freed.fits[self.asked]
+        course = self.begun or started(question, self.seen, hum)
         free = set_free(course, drifted.best.fit)
         return None if free is None else chosen_of(free, question.structures)
-
-    coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
-    if coloured and not any(_has_lines(source.values) for source in question.aligned.inputs):
-        humming = with_hum(joint, with_rows)
-    joint = joint if humming is None else humming.joint
-    kept = fitted if humming is None else beside
-    # Whether there is a drift, the inputs tell that the output is known to follow.
-    aside = {i: fit for i, fit in enumerate(kept.fits) if not fit.related}
-    if len(aside) == len(kept.fits):
-        aside = {}
-    first = joint
-    joint, drifting = with_drift(first, with_rows, steadily)
-    if aside and drifting is not None:
-        aside = {}
-        joint, drifting = with_drift(first, with_rows, steadily)
-    if drifting is not None and humming is not None:
-        humming = replace(humming, trend=hum)
-    if drifting is not None:
-        kept = beside
-    elif freed is not None and joint is freed.fits[asked]:
-        kept = freed
-    kept = replace(kept, drifting=drifting, humming=humming, asked=asked)
-    if several:
-        return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
-    return replace(kept, fits=(joint,), steady=None if drifting is None else fitted.prediction)
 
 
 def _as_before(
     question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
 ) -> OutputFit:
-    """Keep what a search beside `rows` found, or the plainer dynamics found before, if likelier.
+    """The fit that a search with `rows` found, or the plainer dynamics found before if likelier.
 
-    A search may end in modes without number.
+    A search may end in a large number of modes.
     """
     (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
     if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
@@ -218,9 +235,9 @@ def _as_before(
 def _plain_beside_drift(
     question: Question, seen: Imperfections, asked: int, first: JointFit
 ) -> OutputFit | None:
-    """Plain dynamics of several inputs and a drift, where they leave white noise.
+    """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `first` is the plain fit to the input that leads, `asked`.
+    `first` is the plain fit to the leading input, `asked`.
     """
     plain = OutputFit(fits=(first,))
     freed: OutputFit | None = None
@@ -262,7 +279,7 @@ def _all_free(
 
 @kept
 def _has_lines(u: Real) -> bool:
-    """Whether an input repeats, or one line is much of it: its distortion then has lines too."""
+    """Whether an input is periodic, or mostly one line: its distortion then has lines too."""
     moves, power = u - u.mean(), windowed_power(u)[_CLEAR:]
     line = line_near(moves, (_CLEAR + int(np.argmax(power))) / u.size) if power.size else 0.5
     much = float(np.var(tone_of(moves, line))) > PART * float(np.var(moves))
@@ -284,7 +301,7 @@ def imperfections_of(
 
 
 def _begin(question: Question, seen: Imperfections) -> Course | None:
-    """Plain fits of one input; None where plain structures are all, and of loops and software."""
+    """Plain fits of one input; None for loops, software and where no other structures are tried."""
     alone = len(question.aligned.inputs) == 1 and question.instrument is None
     if (
         not alone
@@ -298,7 +315,7 @@ def _begin(question: Question, seen: Imperfections) -> Course | None:
 
 
 def started(question: Question, seen: Imperfections, rows: Real | None = None) -> Course:
-    """Plain fits of one input, as they climb from the spectra, with `rows` beside the bias."""
+    """Plain fits of one input, started from the spectra, with `rows` in addition to the bias."""
     (source,) = question.aligned.inputs
     return start(
         source.values,
@@ -312,7 +329,7 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
 
 
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
-    """Samples of the output that tell, (n,); None when all do."""
+    """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
 
 
@@ -327,10 +344,10 @@ def fit_once(
     drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
     briefly: bool = False,
 ) -> OutputFit:
-    """Fit an output to all inputs, with `rows` beside the bias, on the samples that tell.
+    """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
-    The search goes on from `begun`, where the plain fits to the one input are known. Inputs that
-    stand `aside` are not asked; `drifts` and `briefly` are as for `fit_together`.
+    The search continues from `begun`, if the plain fits to a single input are known. Inputs in
+    `aside` are not fitted; `drifts` and `briefly` are as for `fit_together`.
     """
     if begun is not None:
         return OutputFit(fits=(chosen_of(begun, structures),))

@@ -40,7 +40,7 @@ from hmpim.record import Aligned, Intersample, Record, uniform
 __all__ = ["LOOKS", "identify", "identify_output"]
 
 LOOKS = 2
-"""How often an output is looked at again with its model in hand."""
+"""How often an output is examined again with its model known."""
 
 
 @checked
@@ -53,40 +53,41 @@ def identify(
 ) -> Identification:
     """Find delay, scale factor, bias, noise, dynamics and bandwidth, with error bars.
 
-    Nothing need be known beforehand: structure, starting values and what the input does
+    No prior knowledge is needed: structure, starting values and the behaviour of the input
     between its samples come from the record.
 
     Parameters
     ----------
     record : Record or Statistics
-        Inputs and outputs of one test; every pair is identified. Of `hmpim.compress`ed records,
-        what needs samples is left out and said.
+        Inputs and outputs of one test; every pair is identified. With the statistics of
+        `hmpim.compress`, whatever needs samples is omitted, and a warning says so.
     intersample : {'auto', 'zoh', 'foh', 'bandlimited', 'sampled'}
         Whether the input is held, linear or band-limited between its samples; 'sampled' for
-        software, whose output sample follows from samples of its input. 'auto' takes what the
-        record states, and else the likeliest; where rounding is all the noise there is, and no
-        system in continuous time explains the record to that, it is software.
+        software, whose output samples follow from samples of its input. 'auto' uses what the
+        record states, otherwise the most likely; if rounding is the only noise and no system in
+        continuous time explains the record to within it, the unit is taken for software.
     structures : sequence of str, optional
-        Dynamics to try; all of `hmpim.model.STRUCTURES` by default, or of software all of
+        Dynamics to try; all of `hmpim.model.STRUCTURES` by default, for software all of
         `hmpim.model.dynamics.FILTERS`.
+    reference : str, optional
+        Channel that holds the reference of a closed loop; it serves as the instrument.
 
     Returns
     -------
     Identification
-        One pair for each input and output; index it output first.
+        One pair for each input and output, indexed output first.
 
     Raises
     ------
     RecordError
         If the record is too short, an input is constant, or all outputs are.
     ArgumentError
-        If `intersample` or a structure is not known, or `reference` is no channel of the record.
+        If `intersample` or a structure is unknown, or the record has no channel `reference`.
 
     Notes
     -----
     The joint fit is maximum likelihood under white Gaussian noise; with coloured noise the
-    error bars are widened. The paper's figures (section IV) stand beside it in
-    `PairIdentification.paper`.
+    error bars are widened. `PairIdentification.paper` holds the paper's figures (section IV).
 
     Examples
     --------
@@ -157,7 +158,7 @@ def _identify_outputs(question: Question) -> Identification:
 
 
 def identify_output(question: Question) -> Described:
-    """Identify one output against every input, together where there are several."""
+    """Identify one output against every input, jointly if there are several."""
     if not question.moves:
         return describe_dead(question)
     question = recognise_software(mark_swapped(question))

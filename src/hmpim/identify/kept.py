@@ -1,12 +1,12 @@
-"""What follows from some samples alone, kept while records of one stimulus are identified.
+"""A cache of functions of arrays, for identifying one record or many records of one stimulus.
 
-Half a dozen steps of `hmpim.identify` begin with the input: its transform, its splines, the phase
-of its sweep, the regressors of its windows; half a dozen ask whether a residual is white. Inside
-`keeping()` each of these is made once for all samples that are met, and found again by the samples
-themselves; outside nothing is kept. `identify` keeps for itself, a batch for all its records.
+Several steps of `hmpim.identify` begin with the input: its transform, its splines, the phase of its
+sweep, the regressors of its windows; several test whether a residual is white. Inside `keeping()`
+each of these is computed once and found again by the samples themselves; outside nothing is cached.
+`identify` caches for itself, a batch for all its records.
 
 A long array is recognised by its address and not by its samples: nobody may write to one inside
-`keeping`. Of long results at most the last one is kept, and only for functions that ask for it.
+`keeping`. At most one long result of a function is cached, and only if the function asks for it.
 """
 
 from collections import OrderedDict
@@ -22,19 +22,19 @@ import numpy as np
 __all__ = ["keeping", "kept", "recent"]
 
 _MOST = 64
-"""Results that are kept; that used longest ago goes first."""
+"""Cached results; the least recently used is dropped first."""
 
 _LARGEST = 1 << 18
-"""Bytes of an array up to which it is told by its samples, and kept: 32 768 samples."""
+"""Bytes of the largest array that is recognised by its samples, and cached: 32 768 samples."""
 
 _Named = dict[int, tuple[ref[np.ndarray], Hashable, Hashable]]
-"""By address: an array, what shows that it is still the same, and what it is called."""
+"""By address: an array, its fingerprint, and its name in keys."""
 
 _SHOWN = 4096
-"""Samples of a longer array that are looked at to see whether it has changed."""
+"""Samples of a longer array that its fingerprint includes."""
 
 _FEW = 8
-"""Results that `recent` keeps; of larger inputs the last one alone."""
+"""Results that `recent` keeps; only the last one for larger inputs."""
 
 _KEPT: ContextVar[OrderedDict[Hashable, Any] | None] = ContextVar("kept", default=None)
 _NAMED: ContextVar[_Named] = ContextVar("named")
@@ -45,7 +45,7 @@ T = TypeVar("T")
 
 @contextmanager
 def keeping() -> Iterator[None]:
-    """Keep what follows from inputs alone until the end of the block; within another, for that.
+    """Cache results until the end of the block; an inner block shares the cache of the outer one.
 
     Examples
     --------
@@ -72,14 +72,14 @@ def keeping() -> Iterator[None]:
 
 
 def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
-    """Have a function of arrays and plain values made once for equal arguments, inside `keeping`.
+    """Cache a function of arrays and plain values inside `keeping`.
 
-    What it returns is handed out again: nobody may write to it, and arrays are locked. A long
-    result is kept only with `long`, and only until the next one.
+    Results are shared: nobody may write to them, and arrays are read-only. A long result is cached
+    only with `long`, and only until the next one.
     """
 
     @wraps(function)
-    def told(*args: P.args, **kwargs: P.kwargs) -> T:
+    def cached(*args: P.args, **kwargs: P.kwargs) -> T:
         known = _KEPT.get()
         if known is None:
             return function(*args, **kwargs)
@@ -89,7 +89,7 @@ def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
         if key in known:
             known.move_to_end(key)
             return cast(T, known[key])
-        last, found = known.get(told, (None, None))
+        last, found = known.get(cached, (None, None))
         if last == key:
             return cast(T, found)
         found = function(*args, **kwargs)
@@ -101,16 +101,16 @@ def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
         if short:
             known[key] = found
         else:
-            known[told] = key, found
+            known[cached] = key, found
         while len(known) > _MOST:
             known.popitem(last=False)
         return found
 
-    return told
+    return cached
 
 
 def recent(owner: Hashable, nbytes: int) -> "Recent | None":
-    """What one owner has made of late, of inputs of so many bytes; None outside `keeping`."""
+    """Recent results of one owner, for inputs of `nbytes`; None outside `keeping`."""
     known = _KEPT.get()
     if known is None:
         return None
@@ -120,7 +120,7 @@ def recent(owner: Hashable, nbytes: int) -> "Recent | None":
 
 
 class Recent(OrderedDict[Hashable, Any]):
-    """A few results, that made longest ago going first."""
+    """A few results; the oldest is dropped first."""
 
     most = 1
 
@@ -131,7 +131,7 @@ class Recent(OrderedDict[Hashable, Any]):
 
 
 def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable | None:
-    """The samples themselves, or for many of them where they stand; None if one is no value."""
+    """Key of a call, by samples or for long arrays by address; None if an argument has none."""
     parts: list[Hashable] = [function]
     for value in values:
         if isinstance(value, np.ndarray):
@@ -144,24 +144,24 @@ def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable | No
 
 
 def _name_of(array: np.ndarray) -> Hashable:
-    """What stands for an array: its bytes, whose hash is made once; of a long one its address."""
+    """Name of an array in keys: its bytes, hashed once, or an object for a long array."""
     named = _NAMED.get()
     long = array.nbytes > _LARGEST
-    shown: Hashable = _some_of(array) if long else array.tobytes()
+    fingerprint: Hashable = _some_of(array) if long else array.tobytes()
     known = named.get(id(array))
-    if known is not None and known[0]() is array and known[1] == shown:
+    if known is not None and known[0]() is array and known[1] == fingerprint:
         return known[2]
     if len(named) > 4 * _MOST:
         named.clear()
-    name = object() if long else shown
-    named[id(array)] = ref(array), shown, name
+    name = object() if long else fingerprint
+    named[id(array)] = ref(array), fingerprint, name
     return name
 
 
 def _some_of(array: np.ndarray) -> Hashable:
-    """What shows that a long array is still the same."""
-    shown: Hashable = array.flat[:: 1 + array.size // _SHOWN].sum().item()
-    return shown
+    """Fingerprint of a long array, to notice a change."""
+    total: Hashable = array.flat[:: 1 + array.size // _SHOWN].sum().item()
+    return total
 
 
 def _is_short(found: Any) -> bool:

@@ -1,4 +1,4 @@
-"""All that is said of one output and one input, once the joint fit is made."""
+"""The description of one output and one input, made from the joint fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -58,14 +58,14 @@ __all__ = ["Described", "describe", "describe_dead"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Described:
-    """All that is said of one output: a pair for each input, and how much all explain together."""
+    """The description of one output: a pair for each input, and their multiple coherence."""
 
     pairs: tuple[PairIdentification, ...]
     coherence: OutputCoherence | None = None
 
 
 def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Described:
-    """Say all that is known of an output, against each input in that one's own band."""
+    """Describe an output, with respect to each input in the band of that input."""
     aligned, output, inputs = question.aligned, question.output, question.inputs
     if inputs is None:
         (source,) = aligned.inputs
@@ -75,11 +75,11 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
                 pair = replace(pair, warnings=(question.swapped, *pair.warnings))
             return Described(pairs=(pair,))
         said = question.swapped or unfollowed(output.name, source.name)
-        return Described(pairs=(_untold(question, 0, said),))
-    told = seen.counting(np.asarray(output.valid), aligned.fs)
-    responses = responses_of(aligned, output, told, fitted, inputs)
+        return Described(pairs=(_unrelated(question, 0, said),))
+    counted = seen.counting(np.asarray(output.valid), aligned.fs)
+    responses = responses_of(aligned, output, counted, fitted, inputs)
     none: tuple[Finding, ...] = ()
-    more, _ = attempt("misfit", lambda: unfound(fitted, responses, inputs), none)  # said of a pair
+    more, _ = attempt("misfit", lambda: unfound(fitted, responses, inputs), none)
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
@@ -88,12 +88,12 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
             pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
         else:
             finding = unrelated(output.name, source.name, responses.columns[i])
-            pairs.append(_untold(question, i, finding, responses.columns[i]))
+            pairs.append(_unrelated(question, i, finding, responses.columns[i]))
     return Described(pairs=with_noise_doubted(pairs, fitted), coherence=responses.coherence)
 
 
 def describe_dead(question: Question) -> Described:
-    """Say of an output that is constant that it is."""
+    """Describe an output that is constant."""
     output = question.output
     finding = Finding(
         code="dead_channel",
@@ -103,22 +103,21 @@ def describe_dead(question: Question) -> Described:
         parameters=EVERY,
     )
     every = range(len(question.aligned.inputs))
-    return Described(pairs=tuple(_untold(question, i, finding) for i in every))
+    return Described(pairs=tuple(_unrelated(question, i, finding) for i in every))
 
 
 def _pair(
     question: Question, found: Imperfections, joined: OutputFit, i: int, matrix: Responses | None
 ) -> PairIdentification:
-    """Say all that is known of an output that follows an input."""
+    """Describe an output that follows an input."""
     aligned, output = question.aligned, question.output
-    drifting, humming, disturbance = joined.drifting, joined.humming, joined.disturbance
     source, band = aligned.inputs[i], question.band(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
     joint, inspection, unseen = _looked_through(question, found, joint, i, plain)
+    said = () if inspection is None else inspection.findings
+    command = source.values if question.limited is None else question.limited.recorded
     y = output.values if matrix is None else joint.problem.y
-    limited = question.limited
-    command = source.values if limited is None else limited.recorded
     paper = paper_estimates(command, y, aligned.fs, band=band)
     readings = read_parameters(
         joint,
@@ -132,11 +131,8 @@ def _pair(
     response = (
         _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
     )
-    said = () if inspection is None else inspection.findings
     none: tuple[Bend, ...] = ()
     moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
-    bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
-    course = None if joined.gaining is None or not joined.gaining.taken else joined.gaining.course
     from_response, unread = attempt(
         "response_bandwidths",
         lambda: _bandwidths(question, joint, readings, response, i, matrix),
@@ -146,26 +142,23 @@ def _pair(
         "misfit", lambda: _left(question, joint, i, matrix), Misfit(share=0.0, probability=1.0)
     )
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
+    bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
     evidence = replace(
         evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
     )
     parameters, seen = with_imperfections(evidence.spanned, found, censored, output.unit)
     known = {finding.code for finding in seen}
     findings = (
-        *(() if question.instrument is None else (question.instrument.finding(),)),
-        *(() if limited is None else (speed_finding(limited, aligned.fs, source.unit),)),
+        *_found_before(question, source.unit),
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *(
-            ()
-            if drifting is None
-            else drift_findings(drifting, aligned.fs, output.unit, white=readings.white)
-        ),
-        *(() if humming is None else (hum_finding(humming, aligned.fs, output.unit),)),
+        *_disturbances(question, joined, white=readings.white),
         *(*unseen, *unmoved, *unread, *untested),
     )
     fit = joint.best.fit
+    gaining, disturbance = joined.gaining, joined.disturbance
+    course = None if gaining is None or not gaining.taken else gaining.course
     numerator, denominator = coefficients_of(readings.system)
     return PairIdentification(
         input=source.name,
@@ -189,6 +182,24 @@ def _pair(
     )
 
 
+def _found_before(question: Question, unit: str) -> list[Finding]:
+    """Findings about the question itself: a loop's reference, a command of limited speed."""
+    found = [] if question.instrument is None else [question.instrument.finding()]
+    if question.limited is not None:
+        found.append(speed_finding(question.limited, question.aligned.fs, unit))
+    return found
+
+
+def _disturbances(question: Question, joined: OutputFit, *, white: bool) -> list[Finding]:
+    """Findings about drift and hum."""
+    fs, unit, found = question.aligned.fs, question.output.unit, []
+    if joined.drifting is not None:
+        found += drift_findings(joined.drifting, fs, unit, white=white)
+    if joined.humming is not None:
+        found.append(hum_finding(joined.humming, fs, unit))
+    return found
+
+
 def _evidence(
     question: Question,
     readings: Readings,
@@ -199,9 +210,9 @@ def _evidence(
     moves: tuple[Bend, ...],
     joined: OutputFit,
 ) -> Evidence:
-    """What the checks look at."""
+    """The evidence that the checks examine."""
     fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
-    # Nothing is said of the gain beside a fit that a nonlinearity has replaced.
+    # A change of the gain is not reported with a fit that a nonlinearity has replaced.
     gaining = joined.gaining if fit is joined.fits[i].best.fit else None
     evidence = Evidence(
         joint=joint,
@@ -246,7 +257,7 @@ def _left(question: Question, joint: JointFit, i: int, matrix: Responses | None)
 
 
 def _other_explanations(gaining: GainChange | None, drifting: Drifting | None) -> list[Fit]:
-    """Fits without a gain or a bias that changes, or with one, where the record cannot tell."""
+    """Alternative fits, with or without a changing gain or bias, that the record cannot exclude."""
     others = [] if gaining is None else [*gaining.others]
     if drifting is not None and drifting.rival is not None:
         others.append(drifting.rival)
@@ -261,10 +272,10 @@ def _bandwidths(
     i: int,
     matrix: Responses | None,
 ) -> ResponseBandwidths:
-    """Bandwidths by the measured response; if apart from the model's, less the estimator's bias.
+    """Bandwidths of the measured response, less the estimator's bias if the model's differ.
 
-    Between lines, and beside a notch of the input, a local fit is off whatever the noise: by what
-    it is off where the model's own output is the record.
+    Between lines, and next to a notch of the input, a local fit is biased whatever the noise. The
+    bias is that which it has when the record is the model's own output.
     """
     fs, fit = question.aligned.fs, joint.best.fit
 
@@ -291,10 +302,10 @@ def _bandwidths(
 def _refined(
     question: Question, found: Imperfections, joined: OutputFit, i: int
 ) -> tuple[JointFit, CensoredFit | None, Real | None]:
-    """The fit with clipped and held samples counted as what they are, and a covariance known."""
+    """The fit with the likelihood of clipped and held samples, and its covariance if known."""
     joint = joined.fits[i]
     covariance = joined.covariances[i] if joined.covariances else None
-    software = joint.best.fit.structure.sampled  # it holds what it said at a sample
+    software = joint.best.fit.structure.sampled  # it holds its output between samples
     if question.inputs is not None or question.instrument is not None or software:
         return joint, None, covariance
     refined = refine(
@@ -308,7 +319,7 @@ def _refined(
 def _looked_through(
     question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
 ) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
-    """The fit, plain where a nonlinearity explains what a rich one was taken for; and the look."""
+    """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity."""
     inspection, unseen = attempt(
         "nonlinearity", lambda: _inspected(question, found, joint, i, plain), None
     )
@@ -323,7 +334,7 @@ def _looked_through(
 def _inspected(
     question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
 ) -> Inspection | None:
-    """What of the residual is nonlinear; not asked of a loop."""
+    """The nonlinear part of the residual; not tested in a loop."""
     if question.instrument is not None:
         return None
     aligned, output = question.aligned, question.output
@@ -341,12 +352,12 @@ def _inspected(
 
 
 def _floor(question: Question, found: Imperfections) -> float:
-    """R.m.s. that rounding leaves, by the output's steps or by the arithmetic's."""
+    """R.m.s. of the rounding error, by the steps of the output or of the arithmetic."""
     return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
 
 
 def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
-    """Whether a plain fit and a nonlinearity take the place of a rich one; not asked of a loop."""
+    """Whether a plain fit and a nonlinearity replace a rich one; not tested in a loop."""
     if question.instrument is not None or joint.best.fit.structure.sampled:
         return False
     return is_bent_instead(
@@ -368,9 +379,9 @@ def _bends(
     plain: Fit | None,
     said: tuple[Finding, ...],
 ) -> tuple[Bend, ...]:
-    """How far a nonlinearity may have moved the figures; not asked where all are doubted for it.
+    """How far a nonlinearity may have moved the figures; not tested where it made all doubtful.
 
-    Nor of several inputs, of a loop, and of software.
+    Nor with several inputs, in a loop, or for software.
     """
     best, fs = joint.best, question.aligned.fs
     doubted = any(finding.severity == "doubt" for finding in said)
@@ -386,19 +397,19 @@ def _bends(
 def _measured(
     question: Question, found: Imperfections, joint: JointFit, readings: Readings, i: int
 ) -> FrequencyResponse:
-    """Local response; where samples do not tell, the model fills in, and its error is added.
+    """Local response; the model replaces samples that are not informative, and its error is added.
 
-    Noise decides which samples near a level are clipped, so those that are left are not a fair
-    choice; the model alone in place of the others would pull the response towards the level.
+    Noise decides which samples near a level are clipped, so the others are not a fair selection.
+    The model alone in their place would pull the response towards the level.
     """
     u, fs, band = question.aligned.inputs[i].values, question.aligned.fs, question.band(i)
     fit, y = joint.best.fit, joint.problem.y  # without the drift
     if question.instrument is not None:
         return response_through(question.instrument, y, fs, band=band)
-    told = found.counting(np.asarray(question.output.valid), fs)
-    if told is None:
+    counted = found.counting(np.asarray(question.output.valid), fs)
+    if counted is None:
         return _local(u, y, fit, fs, band)
-    response = _local(u, np.where(told, y, fit.prediction + fit.residual), fit, fs, band)
+    response = _local(u, np.where(counted, y, fit.prediction + fit.residual), fit, fs, band)
     covariance = readings.coefficient_covariance
     if not np.isfinite(covariance).all():
         return response
@@ -407,9 +418,9 @@ def _measured(
 
 
 def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> FrequencyResponse:
-    """Local response; of an integrator through the output's differences, which do not wander.
+    """Local response; that of an integrator from the output's differences.
 
-    Where an integrating output ends is not where it began, and that step leaks into every bin.
+    An integrating output does not end where it began, and that step leaks into every bin.
     """
     delay = fit.delay / fs
     if not fit.structure.integrators:
@@ -430,7 +441,7 @@ def _fit_percents(joint: JointFit, costs: Sequence[float]) -> list[float]:
 
 def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
     ordered = sorted(joint.trials, key=lambda trial: trial.criterion)
-    told = _fit_percents(joint, [trial.fit.cost for trial in ordered])
+    percents = _fit_percents(joint, [trial.fit.cost for trial in ordered])
     return tuple(
         Candidate(
             structure=trial.fit.structure.name,
@@ -439,14 +450,14 @@ def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
             fit_percent=fit_percent,
             chosen=trial is joint.best,
         )
-        for trial, fit_percent in zip(ordered, told, strict=True)
+        for trial, fit_percent in zip(ordered, percents, strict=True)
     )
 
 
-def _untold(
+def _unrelated(
     question: Question, i: int, finding: Finding, response: FrequencyResponse | None = None
 ) -> PairIdentification:
-    """Say what little can be said of an output that does not follow the input."""
+    """Describe an output that does not follow the input."""
     aligned, output = question.aligned, question.output
     source, band = aligned.inputs[i], question.band(i)
     counted = output.values[output.valid]

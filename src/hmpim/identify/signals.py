@@ -1,4 +1,4 @@
-"""What may be analysed: finite real samples, as many in as out, at a positive rate; how late."""
+"""Checks of signals: finite real samples of equal length, a positive rate, a longest lag."""
 
 import math
 
@@ -21,7 +21,7 @@ __all__ = [
 _FEWEST_SAMPLES = 4
 
 _FARTHEST = 0.85
-"""Longest lag that is looked for, over the record's length; what is left must show an answer."""
+"""Longest lag over the record's length; the remaining samples must still show a response."""
 
 
 def as_signal(name: str, values: ArrayLike) -> Real:
@@ -121,9 +121,9 @@ def check_band(band: tuple[float, float], fs: float) -> None:
 
 
 def bins_in(band: tuple[float, float], step: float, bins: int) -> tuple[int, int]:
-    """First and last bin of a band in Hz, that at 0 Hz left out, of so many `step` Hz apart.
+    """First and last bin of a band in Hz, without bin 0, among `bins` bins `step` Hz apart.
 
-    The first is beyond the last where there is none.
+    If there is none, the first is greater than the last.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def bins_in(band: tuple[float, float], step: float, bins: int) -> tuple[int, int
 
 
 def longest_lag(samples: int) -> int:
-    """Longest lag, in samples, that is looked for in so many.
+    """Longest lag, in samples, that is considered in a record of so many samples.
 
     Examples
     --------
@@ -146,9 +146,9 @@ def longest_lag(samples: int) -> int:
 
 
 def whole_lag(delay: float, fs: float, samples: int) -> int:
-    """Whole samples by which an output is moved back, below 0 forward; the phase takes the rest.
+    """Whole samples of a delay, by which an output is shifted; the phase accounts for the rest.
 
-    A delay beyond most of the record leaves too little.
+    It is limited, since a delay of most of the record leaves too few samples.
 
     Examples
     --------

@@ -52,15 +52,15 @@ def look(question: Question) -> Imperfections:
 
 
 def mark_swapped(question: Question) -> Question:
-    """Say if the one input there is follows the output; a late clock alone may do it."""
+    """Mark the question if its only input follows the output; a late clock may look the same."""
     output = question.output
     if len(question.aligned.inputs) > 1 or question.instrument is not None:
         return question
     (source,) = question.aligned.inputs
     if not is_swapped(source.values, output.values, source.valid & output.valid):
         return question
-    if lags_behind(fit_once(question, look(question), question.plain).fits[0]):  # it was the clock
-        return question
+    if lags_behind(fit_once(question, look(question), question.plain).fits[0]):
+        return question  # the clock is late
     finding = swapped_finding(source.name, output.name)
     return replace(question, structures=question.plain, swapped=finding)
 
@@ -68,7 +68,7 @@ def mark_swapped(question: Question) -> Question:
 def drift_or_levels(
     question: Question, seen: Imperfections, fitted: OutputFit
 ) -> tuple[Imperfections, OutputFit]:
-    """Take levels behind the noise, where they explain better what was taken for a drift."""
+    """Replace a drift by saturation levels after the noise if they explain the output better."""
     if fitted.steady is None or seen.saturation is not None:
         return seen, fitted
     plateau = imperfections_of(question, prediction=fitted.steady).saturation
@@ -79,55 +79,54 @@ def drift_or_levels(
     u = question.aligned.inputs[0].values
     refined = refine(levelled.fits[0], clipped, u, question.aligned.fs)
     (drifted,) = fitted.fits
-    left = drifted.best.fit.cost / drifted.problem.counted
-    if refined is None or refined[1].noise_std ** 2 > left:
+    variance = drifted.best.fit.cost / drifted.problem.counted
+    if refined is None or refined[1].noise_std ** 2 > variance:
         return seen, fitted
     return clipped, levelled
 
 
 def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
-    """Look with the model in hand: a plateau can now be told from a crest."""
+    """Look again with the model known, which distinguishes a plateau from a crest."""
     if question.exact:
         return seen
     first = fitted.fits[0]
     seen = _without_clusters(question, seen, fitted)
     residual = first.best.fit.residual
-    asked = seen.saturation is not None or seen.hold is not None
-    if not asked and is_white(residual) and not stands_out(first.problem.counting(residual)):
+    limited = seen.saturation is not None or seen.hold is not None
+    if not limited and is_white(residual) and not stands_out(first.problem.counting(residual)):
         return seen
-    prediction = fitted.prediction.copy()  # of what came before the free response it says nothing
+    prediction = fitted.prediction.copy()  # it is not valid before the free response
     prediction[: first.forgotten] = question.output.values[: first.forgotten]
     again = imperfections_of(question, prediction=prediction)
     again = replace(again, levels=seen.levels, quantization=seen.quantization)
-    told = again.telling(prediction.size, question.aligned.fs)
-    if told is not None and np.ptp(question.output.values[told]) == 0.0:
-        return seen  # all that moves would be taken for spikes
-    plateau = again.saturation
-    before = seen.saturation
+    informative = again.telling(prediction.size, question.aligned.fs)
+    if informative is not None and np.ptp(question.output.values[informative]) == 0.0:
+        return seen  # all motion would be taken for spikes
+    plateau, before = again.saturation, seen.saturation
     if plateau is None and before is not None and before.noise == "after":
-        kept = goes_beyond(before, question.output.values, prediction)  # else it has settled there
+        kept = goes_beyond(before, question.output.values, prediction)  # else it settled there
         return replace(again, saturation=before if kept else None)
     if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
-        return replace(again, saturation=None)  # a wander bends the output as a level does
+        return replace(again, saturation=None)  # a drift bends the output as a level does
     return again
 
 
 def _without_clusters(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
-    """Take no grid for rounding that the model explains: an input of few levels makes one."""
+    """Drop a rounding grid that the model explains: an input of few levels produces one."""
     if seen.quantization is None:
         return seen
-    y, told = question.output.values, counted_in(question, seen)
-    told = np.ones(y.size, dtype=bool) if told is None else told.copy()
-    told[: fitted.fits[0].forgotten] = False
-    explained = is_predicted(seen.quantization, y[told], fitted.prediction[told])
+    y, valid = question.output.values, counted_in(question, seen)
+    counted = np.ones(y.size, dtype=bool) if valid is None else valid.copy()
+    counted[: fitted.fits[0].forgotten] = False
+    explained = is_predicted(seen.quantization, y[counted], fitted.prediction[counted])
     return replace(seen, quantization=None) if explained else seen
 
 
 def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
-    """Let the gain change along the record, where that explains more; plain dynamics may then do.
+    """Let the gain change during the record if that explains more; plain dynamics may then suffice.
 
-    Of one input; not asked of a loop, of software, behind levels or holds, and where the output
-    follows nothing. A nonlinearity that explains more is left to the checks.
+    Only for a single input that the output follows; not for loops, software, clipped or held
+    outputs. The checks handle a nonlinearity that explains more.
     """
     joint, aligned = fitted.fits[0], question.aligned
     if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
@@ -164,9 +163,9 @@ def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) 
 def limit_speed(
     question: Question, seen: Imperfections, fitted: OutputFit
 ) -> tuple[Question, OutputFit]:
-    """Take what a unit of limited speed makes of its command, where that explains more.
+    """Limit the speed of the command if that explains more.
 
-    Of one input; not asked of a loop, of software, and where the output follows nothing.
+    Only for a single input that the output follows; not for loops and software.
     """
     joint, aligned = fitted.fits[0], question.aligned
     if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
@@ -177,20 +176,20 @@ def limit_speed(
         return question, fitted
     noise = input_noise(source.values, aligned.fs, band=question.band(0))
     if noise is not None and noise.attenuation > WORTH:
-        return question, fitted  # a limit of speed smooths the noise of a measured command
+        return question, fitted  # a speed limit smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
     seen_then, again = fit(slower, seen)
     (other,) = again.fits
     if seen_then is not seen:
-        return question, fitted  # levels explain the rest: the two are not weighed on other samples
+        return question, fitted  # levels were found: costs on different samples do not compare
     if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
         return question, fitted
     return slower, replace(again, fits=(beside_speed(other, limited.slope),))
 
 
 def through_reference(question: Question, fitted: OutputFit) -> OutputFit:
-    """Move a fit to the reference's part of the input to where the input's own residual is."""
+    """Transfer a fit made with the reference's part of the input to the whole input (a loop)."""
     if question.instrument is None or not fitted.fits[0].related:
         return fitted
     joint, own = fit_through(fitted.fits[0], question.instrument)

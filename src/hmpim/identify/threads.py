@@ -1,13 +1,13 @@
-"""What identification asks of its process: one BLAS thread, and memory that is not given back.
+"""Settings of the process for identification: one BLAS thread, and memory kept by the allocator.
 
 Small matrices gain nothing from several BLAS threads, and lose much on a busy machine: on a loaded
 two-core machine a matrix exponential of 8 by 8 took 16 ms with OpenBLAS's own threads and 0.012 ms
 with one.
 
 A record of 10 000 samples passes some hundred arrays of a megabyte through the allocator. The GNU
-C library hands each back to the system and has it cleared and mapped anew, page by page, until
-a block as large as `_BLOCK` was freed once (mallopt(3), M_MMAP_THRESHOLD). That took a sixth of
-the time; twice such a block is what may be kept for it.
+C library returns each to the system and maps it again, page by page, until a block as large as
+`_BLOCK` has been freed once (mallopt(3), M_MMAP_THRESHOLD). This took a sixth of the time; the
+allocator may then keep up to twice such a block.
 """
 
 from contextlib import AbstractContextManager
@@ -20,7 +20,7 @@ from threadpoolctl import ThreadpoolController
 __all__ = ["one_thread"]
 
 _BLOCK = 31 << 20
-"""Bytes: just below the 32 MiB from which on nothing is learnt."""
+"""Bytes: just below the 32 MiB from which the allocator learns nothing."""
 
 
 @cache
