@@ -192,7 +192,8 @@ def _found_before(question: Question, unit: str) -> list[Finding]:
 
 def _disturbances(question: Question, joined: OutputFit, *, white: bool) -> list[Finding]:
     """Findings about drift and hum."""
-    fs, unit, found = question.aligned.fs, question.output.unit, []
+    fs, unit = question.aligned.fs, question.output.unit
+    found: list[Finding] = []
     if joined.drifting is not None:
         found += drift_findings(joined.drifting, fs, unit, white=white)
     if joined.humming is not None:
