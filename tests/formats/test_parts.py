@@ -117,7 +117,7 @@ def test_two_files_on_two_clocks(tmp_path, known):
     (finding, *_) = [f for f in record.findings if f.code == "clock_offset"]
     assert finding.severity == "info"
     if known == "common":
-        assert "is 3.250000 ±" in finding.message
+        assert "is offset by 3.250000 ±" in finding.message
 
 
 def test_an_unknown_offset_makes_the_delay_doubtful(tmp_path, log):
@@ -125,7 +125,7 @@ def test_an_unknown_offset_makes_the_delay_doubtful(tmp_path, log):
     (finding,) = [f for f in record.findings if f.code == "clock_offset"]
     assert finding.severity == "doubt"
     assert "delay" in finding.parameters
-    assert "cannot be told from delay" in finding.message
+    assert "cannot be distinguished from delay" in finding.message
     t = np.arange(round(20 * FS)) / FS
     other = table(tmp_path / "b.csv", ["time", "z"], [t, twice(t)])
     record = read(log, outputs=["z"], options=ReadOptions(beside=(other,)))
@@ -160,7 +160,7 @@ def test_names_that_two_files_have_are_preceded_by_the_file(tmp_path, log):
     ("options", "words"),
     [
         ({"offsets": {"x": 1.0}}, "offset is given for 'x', which is neither a channel"),
-        ({"common": "u"}, "common channel 'u' is given and one file"),
+        ({"common": "u"}, "common channel 'u' is given with one file"),
     ],
 )
 def test_options_that_fit_nothing(log, options, words):

@@ -88,7 +88,7 @@ def _gaps(rows: Sequence[Row]) -> str:
     drawn = [curve for row in rows if _is_clear(row) and (curve := _curve(row)) is not None]
     if all(len(stretches(curve.frequency)) == 1 for curve in drawn):
         return ""
-    return " A curve is interrupted where the axes that move at once cannot be told apart."
+    return " A curve is interrupted where axes that move at once cannot be distinguished."
 
 
 def _overlaid(rows: Sequence[Row], every: Sequence[Row], compare: Compare) -> Description | None:

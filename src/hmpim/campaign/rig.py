@@ -115,7 +115,7 @@ def _imported(entry: str, folder: str) -> Player:
     except Exception as error:  # a module of one's own may raise anything
         raise RigError(
             f"rig.entry = {entry!r} cannot be imported: {type(error).__name__}: {error}; it must "
-            "name a function that Python finds from here or beside the plan"
+            "name a function that Python finds from here or in the folder of the plan"
         ) from error
     if not callable(found):
         raise RigError(f"rig.entry = {entry!r} is {found!r}; it must name a function")

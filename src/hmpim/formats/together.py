@@ -97,7 +97,7 @@ class Logs:
                 known = [*names, *(log.path.name for log in self.logs[1:])]
                 raise ArgumentError(
                     f"an offset is given for {name!r}, which is neither a channel of the record "
-                    f"nor a file beside; those are {listed(known)}"
+                    f"nor another file; those are {listed(known)}"
                 )
 
     def _on_first_clock(
@@ -150,8 +150,8 @@ def open_logs(
     if common is not None:
         if not beside:
             raise ArgumentError(
-                f"common channel {common!r} is given and one file; give the other with beside=... "
-                "or --beside"
+                f"common channel {common!r} is given with one file only; give the other with "
+                "beside=... or --beside"
             )
         for log in logs:
             if find_channel(common, log.contents) is None:
@@ -245,8 +245,8 @@ def _unknown(what: str, how: str) -> Finding:
     return Finding(
         code="clock_offset",
         message=(
-            f"{start} {rest} cannot be told from delay: state it with --offset, or record one "
-            "signal on both clocks and name it with --common"
+            f"{start} {rest} cannot be distinguished from delay: state it with --offset, or record "
+            "one signal on both clocks and name it with --common"
         ),
         severity="doubt",
         parameters=_DELAYS,
@@ -262,10 +262,10 @@ def _estimated(
     return Finding(
         code="clock_offset",
         message=(
-            f"The clock of {name!r} is {found.offset:.6f} ± {found.std:.2g} s beside that of "
-            f"{first!r} and drifts by {1e6 * found.drift:.3g} ± {1e6 * found.drift_std:.2g} parts "
-            f"in a million, by {common!r} in both (correlation {found.correlation:.4f}); the ± of "
-            "the offset adds to that of the delay"
+            f"The clock of {name!r} is offset by {found.offset:.6f} ± {found.std:.2g} s from that "
+            f"of {first!r} and drifts by {1e6 * found.drift:.3g} ± {1e6 * found.drift_std:.2g} "
+            f"parts in a million, by {common!r} in both (correlation {found.correlation:.4f}); "
+            "the ± of the offset adds to that of the delay"
         ),
         severity="doubt" if rough else "info",
         parameters=_DELAYS,

@@ -291,9 +291,9 @@ def _held_between(record: Record, clock: Clock, intersample: Intersample) -> Fin
     return Finding(
         code="held_between",
         message=(
-            f"Values of {names} {how} beside the samples of {record.outputs[0].name!r} at "
-            f"{clock.fs:.6g} Hz; what is answered between samples folds in these, which only "
-            "identification of the record itself puts right"
+            f"Values of {names} {how} between the samples of {record.outputs[0].name!r} at "
+            f"{clock.fs:.6g} Hz; the response between samples is aliased in these, which only "
+            "identification of the original record corrects"
         ),
         severity="doubt",
         parameters=("delay", "delay_correlation", "delay_low_frequency"),
@@ -314,7 +314,7 @@ def _resampled(
         code="resampled",
         message=(
             f"{channel.name!r} has a clock of its own ({own.fs:.6g} Hz, "
-            f"{place - np.floor(place):.2g} of an interval beside that of {first.name!r} at "
+            f"{place - np.floor(place):.2g} of an interval after that of {first.name!r} at "
             f"{clock.fs:.6g} Hz) and {how}{'' if held else '; neither moves its delay'}"
         ),
         severity="info",

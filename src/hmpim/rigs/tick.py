@@ -168,7 +168,7 @@ class TickClock:
 
     def _compared(self) -> str:
         """How the computer's clock runs against the pulses, or why that is not told."""
-        unknown = "how this computer's clock runs against it is not told, as"
+        unknown = "the rate of this computer's clock against it is unknown, as"
         counts = self._numbers.counts
         odd = counts.lost + counts.doubled + counts.swapped
         if len(self._stamps) < _FEWEST:

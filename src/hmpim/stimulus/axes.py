@@ -159,7 +159,7 @@ def design_axes(
     for _ in range(8):  # what the leads take is known once they are made
         if length <= 0.0:
             raise ArgumentError(
-                f"duration = {duration:g} s leaves no time to move beside leads and a tail of "
+                f"duration = {duration:g} s leaves no time to move between leads and a tail of "
                 f"{tail:g} s; make it longer"
             )
         made = _made(plans, length, fs, method)

@@ -39,7 +39,7 @@ def write_isaac(source: Source, path: Path, *, timestep: float | None) -> tuple[
     ):
         raise ArgumentError(
             f"{source.pair.structure} is neither a first-order lag nor of second order, which is "
-            "what a PD actuator makes; export to python and step that beside it"
+            "what a PD actuator makes; export to python and step that in parallel"
         )
     ranges = ranges_of(source)
     low, high = ranges.get("delay", (model.delay, model.delay))

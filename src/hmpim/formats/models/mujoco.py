@@ -95,7 +95,7 @@ def _stepped(source: Source, timestep: float | None) -> Stepped:
     if len(model.numerator) > 1 or len(model.denominator) > 4:
         raise ArgumentError(
             f"{source.pair.structure} has zeros or more than three poles, which MuJoCo's actuators "
-            "have not; export to c or python and step that beside it"
+            "lack; export to c or python and step that in parallel"
         )
     poles = np.roots(model.denominator)
     poles = poles[np.argsort(np.abs(poles.imag) > 0)]  # real ones first

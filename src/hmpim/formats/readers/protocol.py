@@ -187,7 +187,7 @@ def listed(names: Sequence[str]) -> str:
     """
     more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
     short = [n if len(n) <= _LONGEST else n[:_LONGEST] + "…" for n in names[:_LISTED]]
-    return ", ".join(short) + more or "none beside time"
+    return ", ".join(short) + more or "none except time"
 
 
 def need(module: str, *, extra: str, what: str) -> ModuleType:

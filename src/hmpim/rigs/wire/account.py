@@ -213,8 +213,8 @@ def _lag(seconds: float, name: str) -> Finding:
         code="lag",
         message=(
             f"{name!r} fell behind its own clock by up to {1e3 * seconds:.3g} ms. Its samples are "
-            "stamped with the time they stand for, but a real unit beside it would not wait: run "
-            "it on a quieter computer."
+            "stamped with the time at which they were due, but a real unit would not have waited: "
+            "run it on a quieter computer."
         ),
         severity="info",
         parameters=(),

@@ -125,7 +125,9 @@ def fit_clocks(
         method="highs",
     )
     if not solved.success or solved.x is None:
-        raise ArgumentError(f"the clocks cannot be told from these time stamps: {solved.message}")
+        raise ArgumentError(
+            f"the clocks cannot be determined from these time stamps: {solved.message}"
+        )
     c_there, c_back, slope = solved.x
     lowest_there = level_there + unit * float(c_there)
     lowest_back = level_back + unit * float(c_back)
