@@ -25,6 +25,7 @@ ROWS = {
     )
 }
 ELSEWHERE = {
+    "identify/nonlinear/modelled.py": "a kind of nonlinearity: docs/nonlinearity.md",
     "identify/nonlinear/nonlinearity.py": "a kind of nonlinearity: docs/nonlinearity.md",
     "rigs/tracker/rig.py": "asked for below",
 }

@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 from hmpim.arguments import checked
 from hmpim.identify.asked.clocks import settled_between
@@ -28,10 +29,10 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.steps import (
     drift_or_levels,
     let_gain_change,
-    limit_speed,
     look,
     look_again,
     mark_swapped,
+    model_nonlinearity,
     through_reference,
 )
 from hmpim.identify.threads import one_thread
@@ -50,6 +51,7 @@ def identify(
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
     reference: str | None = None,
+    nonlinear: Literal["modelled", "reported"] = "modelled",
 ) -> Identification:
     """Find delay, scale factor, bias, noise, dynamics and bandwidth, with error bars.
 
@@ -71,6 +73,10 @@ def identify(
         `hmpim.model.dynamics.FILTERS`.
     reference : str, optional
         Channel that holds the reference of a closed loop; it serves as the instrument.
+    nonlinear : {'modelled', 'reported'}
+        'modelled' includes backlash, a dead zone, friction or a spring in the model if that leaves
+        white noise: the figures are those of the linear part. 'reported' gives the linear model
+        that is best at this amplitude.
 
     Returns
     -------
@@ -121,6 +127,7 @@ def identify(
         structures=names,
         inputs=None,
         instrument=instrument,
+        linear=nonlinear == "reported",
     )
 
     def between_clocks(one_clock: Aligned, plainly: bool) -> Identification:
@@ -171,6 +178,6 @@ def identify_output(question: Question) -> Described:
             break
         seen, fitted = fit(question, seen)
     fitted = let_gain_change(question, seen, fitted)
-    question, fitted = limit_speed(question, seen, fitted)
+    question, fitted = model_nonlinearity(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

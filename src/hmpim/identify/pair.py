@@ -23,7 +23,7 @@ from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
 from hmpim.identify.effects.said import with_imperfections
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
@@ -31,6 +31,7 @@ from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
+from hmpim.identify.nonlinear.modelled import modelled_finding
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import speed_finding
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
@@ -114,8 +115,8 @@ def _pair(
     source, band = aligned.inputs[i], question.band(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
-    joint, inspection, unseen = _looked_through(question, found, joint, i, plain)
-    said = () if inspection is None else inspection.findings
+    joint, inspection, unseen = _looked_through(question, found, joined, joint, i, plain)
+    said = () if inspection is None else _not_modelled(inspection.findings, joined)
     command = source.values if question.limited is None else question.limited.recorded
     y = output.values if matrix is None else joint.problem.y
     paper = paper_estimates(command, y, aligned.fs, band=band)
@@ -143,6 +144,7 @@ def _pair(
     )
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
     bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
+    bent = bent if joined.bending is None else 0.0
     evidence = replace(
         evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
     )
@@ -153,7 +155,7 @@ def _pair(
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *_disturbances(question, joined, white=readings.white),
+        *_disturbances(question, joined, source.unit, white=readings.white),
         *(*unseen, *unmoved, *unread, *untested),
     )
     fit = joint.best.fit
@@ -190,14 +192,18 @@ def _found_before(question: Question, unit: str) -> list[Finding]:
     return found
 
 
-def _disturbances(question: Question, joined: OutputFit, *, white: bool) -> list[Finding]:
-    """Findings about drift and hum."""
+def _disturbances(
+    question: Question, joined: OutputFit, input_unit: str, *, white: bool
+) -> list[Finding]:
+    """Findings about a drift, hum and a nonlinearity that the model includes."""
     fs, unit = question.aligned.fs, question.output.unit
     found: list[Finding] = []
     if joined.drifting is not None:
         found += drift_findings(joined.drifting, fs, unit, white=white)
     if joined.humming is not None:
         found.append(hum_finding(joined.humming, fs, unit))
+    if joined.bending is not None:
+        found.append(modelled_finding(joined.bending, (input_unit, unit)))
     return found
 
 
@@ -317,12 +323,33 @@ def _refined(
     return *refined, refined[1].covariance
 
 
+def _not_modelled(said: tuple[Finding, ...], joined: OutputFit) -> tuple[Finding, ...]:
+    """Findings about a nonlinearity; without doubt, and without its kind, if the model has it."""
+    if joined.bending is None:
+        return said
+    general = (finding for finding in said if finding.code == "nonlinear")
+    return tuple(replace(finding, severity="info", parameters=()) for finding in general)
+
+
 def _looked_through(
-    question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
+    question: Question,
+    found: Imperfections,
+    joined: OutputFit,
+    joint: JointFit,
+    i: int,
+    plain: Fit | None,
 ) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
     """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity."""
+    if joined.bending is not None:
+        whole = joined.bending.as_measured(joint)
+        inspection, unseen = attempt(
+            "nonlinearity", lambda: _inspected(question, found, *whole, i, None), None
+        )
+        return joint, inspection, unseen
     inspection, unseen = attempt(
-        "nonlinearity", lambda: _inspected(question, found, joint, i, plain), None
+        "nonlinearity",
+        lambda: _inspected(question, found, joint.problem, joint.best.fit, i, plain),
+        None,
     )
     if inspection is not None and inspection.fit is not joint.best.fit:
         return taking(joint, inspection.fit), inspection, unseen
@@ -333,7 +360,7 @@ def _looked_through(
 
 
 def _inspected(
-    question: Question, found: Imperfections, joint: JointFit, i: int, plain: Fit | None
+    question: Question, found: Imperfections, problem: Problem, fit: Fit, i: int, plain: Fit | None
 ) -> Inspection | None:
     """The nonlinear part of the residual; not tested in a loop."""
     if question.instrument is not None:
@@ -342,8 +369,8 @@ def _inspected(
     source = aligned.inputs[i]
     return inspect_nonlinearity(
         source.values,
-        joint.problem,
-        joint.best.fit,
+        problem,
+        fit,
         fs=aligned.fs,
         plain=plain,
         others=[other.values for other in aligned.inputs if other is not source],

@@ -42,6 +42,7 @@ class Question:
     exact: bool = False  # whether a filter between samples explains all but rounding
     # of a unit that follows its command up to some speed: then the input is what it follows
     limited: LimitedCommand | None = None
+    linear: bool = False  # whether a nonlinearity is reported only, and not modelled
 
     @property
     def plain(self) -> tuple[StructureName, ...]:

@@ -34,6 +34,7 @@ from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.fitting.washout import washed_out
+from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
@@ -67,6 +68,7 @@ class OutputFit:
     steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
     # what is known of a gain that changes, of an output to one input
     gaining: GainChange | None = None
+    bending: Modelled | None = None  # a nonlinearity of an output to one input
 
     @property
     def prediction(self) -> Real:
@@ -95,7 +97,8 @@ class OutputFit:
     @property
     def disturbance(self) -> Real | None:
         """What moves the output beside the model, shape (n,): drift, hum, a change of the gain."""
-        trends = [one.trend for one in (self.drifting, self.humming) if one is not None]
+        known = (self.drifting, self.humming, self.bending)
+        trends = [one.trend for one in known if one is not None]
         if self.gaining is not None and self.gaining.taken:
             trends.append(self.gaining.trend)
         return np.sum(trends, axis=0) if trends else None

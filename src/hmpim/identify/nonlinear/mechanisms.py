@@ -40,6 +40,7 @@ from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 
 __all__ = [
+    "GAPS",
     "KIND_WORDS",
     "LONGEST_AUTOREGRESSION",
     "RATES",
@@ -78,7 +79,7 @@ KIND_WORDS: dict[Kind, str] = {
     "curvature": "a scale factor that changes with the deflection",
 }
 
-_GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
+GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps tried, over the output's largest deviation."""
 
 RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
@@ -395,7 +396,7 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
         yield Hypothesis(kind="asymmetry", trace=uneven)
         yield Hypothesis(kind="friction", trace=-rubbed)
     turns = _reversals(x)
-    for gap in _GAPS[every // 2 :: every]:
+    for gap in GAPS[every // 2 :: every]:
         half = gap * largest
         trace = (_waiting(x, half, turns) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)

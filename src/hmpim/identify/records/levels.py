@@ -7,6 +7,7 @@ they move, tell where the linear range ends and what ends it.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -209,7 +210,8 @@ def identify_levels(
             "give one amplitude for each"
         )
     check_channels(given)
-    results = [identify(r, intersample=intersample, structures=structures) for r in given]
+    linear = partial(identify, nonlinear="reported")
+    results = [linear(r, intersample=intersample, structures=structures) for r in given]
     comparisons = []
     for pair in results[0].pairs:
         key = (pair.output, pair.input)
@@ -220,7 +222,7 @@ def identify_levels(
             found
             if (found := result[key]).structure == first.structure
             or found.verdict == "not_identifiable"
-            else identify(record, intersample=first.intersample, structures=_only(first.structure))[
+            else linear(record, intersample=first.intersample, structures=_only(first.structure))[
                 key
             ]
             for record, result in zip(given, results, strict=True)

@@ -1,0 +1,234 @@
+"""A nonlinearity as part of the model: one row of the fit, computed from the model in turns.
+
+The row (`hmpim.identify.nonlinear.rows`) changes with the model and the model with the row.
+Successive approximations (É. Picard, J. Math. Pures Appl. 6, 1890), extrapolated, end where both
+agree.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.enrich import PLAIN
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.least_squares import without
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.bends import bends
+from hmpim.identify.nonlinear.fine import linear_part
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Kind
+from hmpim.identify.nonlinear.rows import (
+    TURNS,
+    Command,
+    Nonlinearity,
+    dead_zone,
+    first_rows,
+    with_row,
+)
+from hmpim.identify.result.digits import plus_minus
+from hmpim.identify.worth import MATERIAL, PART
+from hmpim.record import Finding
+
+__all__ = [
+    "Modelled",
+    "described",
+    "is_explained",
+    "kinds_in_question",
+    "leaves_noise",
+    "modelled_finding",
+    "settled_rows",
+]
+
+_FEWEST = 100
+"""Samples that must count: many times the parameters of a model with plain dynamics."""
+
+_LONGEST = 32768
+"""Samples up to which it is tried."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Modelled:
+    """A nonlinearity that is part of the model.
+
+    Parameters
+    ----------
+    kind : str
+        Name as in `hmpim.identify.nonlinear.mechanisms`.
+    size, std : float
+        Half of the gap of backlash, or the deflection at which the restoring force equals friction,
+        in the output's unit; half the width of a dead zone in the input's. Otherwise the share by
+        which the force, or the output, at the largest deflection departs from proportion. And its
+        standard deviation.
+    trend : ndarray, shape (n,)
+        Its effect on the output.
+    waits : ndarray of bool, shape (n,), or None
+        Samples that do not depend on the linear part.
+    """
+
+    kind: Kind
+    size: float
+    std: float
+    trend: Real
+    waits: Mask | None
+
+    def as_measured(self, joint: JointFit) -> tuple[Problem, Fit]:
+        """The output with the nonlinearity, and the linear part, which leaves it over."""
+        problem, fit = joint.problem, joint.best.fit
+        valid, y = problem.valid, problem.y + self.trend
+        if valid is not None and self.waits is not None:
+            valid = valid | self.waits
+        residual = y - fit.prediction if valid is None else np.where(valid, y - fit.prediction, 0.0)
+        whole = replace(fit, residual=residual, cost=float(residual @ residual))
+        return replace(problem, y=y, valid=valid), whole
+
+
+def is_explained(joint: JointFit) -> bool:
+    """Whether plain dynamics leave white noise, so that no nonlinearity need be sought."""
+    fit = joint.best.fit
+    plain = fit.structure.name in PLAIN and is_white(joint.problem.counting(fit.residual))
+    return plain or fit.structure.sampled or joint.problem.y.size > _LONGEST
+
+
+def kinds_in_question(command: Command, problem: Problem, plain: Fit, best: Fit) -> list[Kind]:
+    """Kinds that may explain the residual of a plain fit, the likeliest first.
+
+    Parameters
+    ----------
+    command : Command
+        The input.
+    problem, plain, best
+        The data, the plain fit, and the best linear one.
+
+    Returns
+    -------
+    list of str
+        Empty if the plain fit leaves white noise, or if poles explain what no nonlinearity can.
+    """
+    if problem.counted < _FEWEST or plain.is_white or best.cost < PART**2 * plain.cost:
+        return []
+    found = bends(command.u, problem, plain, intersample=command.intersample, fs=1.0)
+    if not found or not found[0].certain:
+        return []
+    return list(dict.fromkeys(one.kind for one in found))
+
+
+def settled_rows(
+    kind: Kind, command: Command, problem: Problem, start: Fit
+) -> Iterator[Nonlinearity]:
+    """Rows of a kind, each from a fit of the same structure that agrees with it.
+
+    Parameters
+    ----------
+    kind : str
+        A kind of `kinds_in_question`; others have no row.
+    command : Command
+        The input.
+    problem : Problem
+        The data, without the row.
+    start : Fit
+        A linear fit to them.
+    """
+    if kind == "dead_zone":
+        found = dead_zone(command, problem, start)
+        if found is not None:
+            yield found
+    for one in first_rows(kind, command, problem, start):
+        found = _in_turns(one, problem, start)
+        if found is not None:
+            yield found
+
+
+def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity | None:
+    """The row and the fit, each from the other until both agree; None if they do not.
+
+    They agree where the fit gains nothing that an error bar shows.
+    """
+    structure, largest = start.structure, float(np.max(np.abs(linear_part(problem, start))))
+    scale = largest / float(np.max(np.abs(one.row)))  # of a size as large as the linear part
+    at = np.append(start.theta, one.size / scale)
+    tried: list[Real] = []
+    changes: list[Real] = []
+    nearest, least = None, PART
+    for _ in range(TURNS):
+        data = with_row(problem, one)
+        if data.counted < _FEWEST:
+            break
+        before = fit_structure(data, structure, at[:-1], iterations=0)
+        fit = fit_structure(data, structure, at[:-1])
+        deviance = data.counted * float(np.log(before.cost / fit.cost))
+        if deviance < least:  # of the samples that count some come and go
+            nearest, least = one, deviance
+        if one.again is None or least < MATERIAL:
+            break
+        tried.append(at)
+        changes.append(np.append(fit.theta, fit.nuisance[-1] / scale) - at)
+        at = _ahead(tried, changes)
+        if not abs(at[-1]) < 1.0:
+            break
+        there = fit_structure(data, structure, at[:-1], iterations=0)
+        sizes = np.append(there.nuisance[:-1], at[-1] * scale)
+        one = one.again(data, replace(there, nuisance=sizes))
+    return nearest
+
+
+def _ahead(tried: list[Real], changes: list[Real]) -> Real:
+    """Where the changes vanish, from the last few (D. G. Anderson, J. ACM 12, 1965)."""
+    last = tried[-1] + changes[-1]
+    memory = slice(-1 - tried[-1].size, None)
+    moves, differences = (np.diff(np.array(some[memory]), axis=0) for some in (tried, changes))
+    if not len(moves):
+        return last
+    weights = np.linalg.lstsq(differences.T, changes[-1], rcond=None)[0]
+    return np.asarray(last - weights @ (moves + differences))
+
+
+def leaves_noise(joint: JointFit, one: Nonlinearity) -> bool:
+    """Whether a fit leaves white noise, also at samples that do not depend on the linear part."""
+    problem, fit = joint.problem, joint.best.fit
+    every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
+    return fit.is_white and is_white(every)
+
+
+def described(joint: JointFit, one: Nonlinearity) -> Modelled:
+    """The nonlinearity as the fit with its row, the last of its rows, has it."""
+    weighed, fit = joint.weighed, joint.best.fit
+    rows = weighed.fixed()[1:]
+    others = jacobian(replace(weighed, nuisance=rows[:-1]), fit)
+    slope = without(weighed.masked(rows[-1:]), others)
+    left = weighed.innovations(fit.prediction, fit.residual)
+    freedom = max(weighed.counted - others.shape[0] - 1, 1)
+    variance = covariance(slope, left, freedom=freedom, white=is_white(left))
+    size, kind = float(fit.nuisance[-1]), one.kind
+    if kind in ("hardening", "softening"):
+        kind = "hardening" if size > 0.0 else "softening"
+    std = float(np.sqrt(variance[0, 0]))
+    waits = None if one.counts is None else ~one.counts
+    if waits is not None:
+        waits[: max(one.begins, joint.forgotten)] = False
+    return Modelled(kind=kind, size=size, std=std, trend=size * one.row, waits=waits)
+
+
+def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
+    """State which nonlinearity is part of the model; the units are the input's and the output's."""
+    words: dict[Kind, str] = {
+        "backlash": "half its gap is",
+        "dead_zone": "half its width is",
+        "friction": "it equals the restoring force at a deflection of",
+    }
+    if one.kind in words:
+        unit = units[one.kind != "dead_zone"]
+        size = f"{words[one.kind]} {plus_minus(one.size, one.std)} {unit}".rstrip()
+    else:
+        share = plus_minus(100.0 * abs(one.size), 100.0 * one.std)
+        size = f"{share} % of the linear part at the largest deflection"
+    return Finding(
+        code=one.kind,
+        message=f"The model includes {KIND_WORDS[one.kind]}: {size}. The figures are those of the "
+        "linear part. Include this effect in a simulation, or keep the stimulus away from it.",
+        severity="info",
+        parameters=(),
+    )

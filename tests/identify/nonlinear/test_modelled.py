@@ -1,0 +1,188 @@
+"""Nonlinearities that are part of the model: the linear part's figures, and the size."""
+
+import numpy as np
+import pytest
+import scipy
+
+import hmpim
+from hmpim.identify.fitting.fit import Problem, fit_structure
+from hmpim.identify.nonlinear.fine import FINE, linear_part, linear_part_finely
+from hmpim.identify.nonlinear.mechanisms import play
+from hmpim.identify.nonlinear.rows import _stick_slip
+from hmpim.model import STRUCTURES, prepare_input
+from tests_support import in_studies
+
+FS, DELAY, OMEGA, ZETA = 200.0, 0.03, 2 * np.pi * 10.0, 0.4
+T = np.arange(1600) / FS
+MODEL = hmpim.Model(
+    delay=DELAY, scale_factor=1.5, denominator=(OMEGA**-2, 2 * ZETA / OMEGA, 1.0), bias=0.2
+)
+LINEAR = {"delay": DELAY, "scale_factor": 1.5, "natural_frequency": 10.0, "damping_ratio": ZETA}
+
+
+def sweep(t: np.ndarray) -> np.ndarray:
+    inside = np.maximum(t, 0.0)
+    return np.sin(2 * np.pi * (0.1 * inside + 1.3 * inside**2))
+
+
+def forced(force) -> np.ndarray:
+    """Deflection of a unit with another force, over the linear one's stiffness, by Runge-Kutta."""
+
+    def rates(t, state):
+        y, v = state
+        return [v, OMEGA**2 * (float(sweep(t - DELAY)) - y - force(y)) - 2 * ZETA * OMEGA * v]
+
+    solved = scipy.integrate.solve_ivp(
+        rates, (0.0, T[-1]), [0.0, 0.0], t_eval=T, rtol=1e-8, atol=1e-10
+    )
+    return 1.5 * solved.y[0] + 0.2
+
+
+def rubbed(grip: float) -> np.ndarray:
+    """The same with dry friction, exact over short steps; it stops where it turns."""
+    steps = 96
+    time = (np.arange(T.size * steps) + 0.5) / (FS * steps)
+    rates = np.array([[0, 1, 0], [-(OMEGA**2), -2 * ZETA * OMEGA, OMEGA**2], [0, 0, 0]])
+    (a, b, p), (c, d, q), _ = scipy.linalg.expm(rates / (FS * steps)).tolist()
+    y = v = 0.0
+    out = []
+    for target in sweep(time - DELAY).tolist():
+        out.append(y)
+        way = v if v != 0.0 else target - y
+        if v == 0.0 and abs(target - y) <= grip:
+            continue
+        driven = target - np.copysign(grip, way)
+        y, faster = a * y + b * v + p * driven, c * y + d * v + q * driven
+        v = 0.0 if faster * v < 0.0 else faster
+    return 1.5 * np.array(out[::steps]) + 0.2
+
+
+def motion(kind: str, size: float) -> np.ndarray:
+    fine = 16
+    t = np.arange(T.size * fine) / (FS * fine)
+    if kind == "dead_zone":
+        u = sweep(t)
+        lived = np.sign(u) * np.maximum(np.abs(u) - size, 0.0)
+        return hmpim.simulate(MODEL, lived, fs=FS * fine, intersample="foh")[::fine]
+    if kind == "backlash":
+        linear = hmpim.simulate(MODEL, sweep(t), fs=FS * fine, intersample="foh")
+        return play(linear, size)[::fine]
+    if kind == "curvature":
+        linear = hmpim.simulate(MODEL, sweep(T), fs=FS, intersample="bandlimited") - 0.2
+        return linear + size * linear**3 + 0.2
+    if kind == "friction":
+        return rubbed(size / 1.5)
+    sign = 1.0 if kind == "hardening" else -1.0
+    return forced(lambda y: sign * size * y**3)
+
+
+def recorded(y: np.ndarray, seed: int, noise: float = 0.01) -> hmpim.Record:
+    y = y + noise * np.random.default_rng(seed).standard_normal(T.size)
+    return hmpim.Record.from_arrays({"u": sweep(T)}, {"y": y}, fs=FS, intersample="bandlimited")
+
+
+KINDS = [
+    ("backlash", 0.05),
+    ("dead_zone", 0.08),
+    ("friction", 0.03),
+    ("hardening", 0.05),
+    ("softening", 0.04),
+    ("curvature", 0.03),
+]
+
+
+@pytest.mark.parametrize(("kind", "size"), KINDS)
+def test_the_figures_are_those_of_the_linear_part(kind, size):
+    clean = motion(kind, size)
+    pair = hmpim.identify(recorded(clean, 1))["y", "u"]
+    (said,) = [warning for warning in pair.warnings if warning.code == kind]
+    assert said.severity == "info"
+    assert said.message.startswith("The model includes")
+    assert pair.structure == "second_order"
+    assert pair.verdict == "ok"
+    for name, truth in LINEAR.items():
+        figure = getattr(pair.parameters, name)
+        assert abs(figure.value - truth) < 4 * figure.spread, name
+        assert figure.spread < 0.01 * truth, name
+    assert pair.noise_std.value == pytest.approx(0.01, rel=0.1)
+    assert np.std(pair.prediction - clean) < 0.003  # also while it waits
+    if kind in ("backlash", "dead_zone", "friction"):
+        words = said.message.split()
+        place = words.index("±")
+        found, std = float(words[place - 1]), float(words[place + 1].rstrip("."))
+        assert abs(found - size) < 4 * std + 0.01 * size
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize(("kind", "size"), [KINDS[0], *in_studies(*KINDS[1:])])
+def test_the_stated_errors_are_the_scatter(kind, size, seeds):
+    clean, errors = motion(kind, size), []
+    for seed in range(seeds):
+        found = hmpim.identify(recorded(clean, 100 + seed))["y", "u"].parameters
+        figures = [(getattr(found, name), truth) for name, truth in LINEAR.items()]
+        errors += [(figure.value - truth) / figure.spread for figure, truth in figures]
+    assert 0.4 < float(np.sqrt(np.mean(np.square(errors)))) < 1.5
+
+
+def test_of_a_linear_unit_nothing_is_modelled():
+    y = hmpim.simulate(MODEL, sweep(T), fs=FS, intersample="bandlimited")
+    pair = hmpim.identify(recorded(y, 3))["y", "u"]
+    assert not {warning.code for warning in pair.warnings} & {kind for kind, _ in KINDS}
+
+
+def test_what_no_row_stands_for_stays_doubtful():
+    """A scale with a jump in it: no kind leaves white noise."""
+    y = hmpim.simulate(MODEL, sweep(T), fs=FS, intersample="bandlimited")
+    pair = hmpim.identify(recorded(y + 0.15 * (y > 0.7), 3))["y", "u"]
+    assert pair.verdict == "doubtful"
+    assert not any(w.message.startswith("The model includes") for w in pair.warnings)
+
+
+def test_sticking_and_slipping_as_by_an_integrator_with_events():
+    """A unit that is pulled away, passes a reversal, and sticks again."""
+    force, inertia, damping = 0.1, 1.0, 0.3
+    rates = np.array([[0.0, 1.0, 0.0], [-1.0 / inertia, -damping, 1.0 / inertia], [0, 0, 0]])
+    step = scipy.linalg.expm(rates / FINE)[:2]
+    n = 40 * FINE
+    time = np.arange(n + 1) / FINE
+    command = 0.5 * np.sin(0.4 * time)
+    between = 0.5 * (command[:-1] + command[1:])
+    positions, moves = _stick_slip(step, between, 0.0, force, inertia)
+    y = v = 0.0
+    fine, reference = 200, []
+    for k in range(n):
+        reference.append(y)
+        for i in range(fine):
+            pull = command[k] + (command[k + 1] - command[k]) * i / fine - y
+            if v == 0.0 and abs(pull) <= force:
+                continue
+            way = v if v != 0.0 else pull
+            rate = (pull - np.copysign(force, way)) / inertia - damping * v
+            faster = v + rate / (FINE * fine)
+            v = 0.0 if faster * v < 0.0 else faster
+            y += v / (FINE * fine)
+    assert np.max(np.abs(positions[:-1] - reference)) < 2e-3
+    assert 0.3 < np.mean(moves) < 1.0
+
+
+@pytest.mark.parametrize("begins", [None, 0])
+def test_the_linear_part_between_the_samples(begins):
+    """It is the response of the model to the input between its samples."""
+    u = sweep(T)
+    y = hmpim.simulate(MODEL, u, fs=FS, intersample="bandlimited")
+    data = Problem(
+        source=prepare_input(u, "bandlimited", rest=begins is None),
+        y=y,
+        valid=None,
+        longest_delay=20.0,
+        begins=begins,
+    )
+    start = np.array([DELAY * FS, np.log(2 * ZETA / OMEGA * FS), np.log(FS**2 / OMEGA**2)])
+    fit = fit_structure(data, STRUCTURES["second_order"], start)
+    fine = linear_part_finely(data, fit)
+    np.testing.assert_allclose(fine[::FINE], linear_part(data, fit), atol=1e-6)
+    late = hmpim.Model(
+        delay=fit.delay / FS - 0.5 / FS, scale_factor=1.5, denominator=MODEL.denominator
+    )
+    middle = hmpim.simulate(late, u, fs=FS, intersample="bandlimited")
+    np.testing.assert_allclose(fine[FINE // 2 :: FINE][50:], middle[50:-1], atol=2e-3)
