@@ -111,8 +111,14 @@ def _second_order(system: System, drive: Drive, extra, band: float) -> np.ndarra
                 continue
             ahead = v if v != 0.0 else wanted - y
             wanted -= band if ahead > 0 else -band
-        y, now = a * y + b * v + p * wanted, c * y + d * v + q * wanted
-        v = 0.0 if band and now * v < 0 else now
+        further, now = a * y + b * v + p * wanted, c * y + d * v + q * wanted
+        if band and now * v < 0:  # it turns within the step: it stands, or is pulled back
+            until = step * v / (v - now)
+            further, rest = y + 0.5 * v * until, step - until
+            pull = target - further
+            now = omega**2 * (pull - np.copysign(band, pull)) * rest if abs(pull) > band else 0.0
+            further += 0.5 * now * rest
+        y, v = further, now
     return system.gain * out[::FINE] + system.bias
 
 
