@@ -33,13 +33,7 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import (
-    Growth,
-    HiddenPole,
-    grow,
-    one_more_pole,
-    seen_by_pole,
-)
+from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, one_more_pole, seen_by_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED

@@ -57,12 +57,7 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
         if (trial.fit.structure.name, trial.intersample) != (fit.structure.name, mode)
     ]
     return replace(
-        joint,
-        best=best,
-        trials=(*others, best),
-        effective_share=fit.share,
-        rivals=(),
-        hidden=None,
+        joint, best=best, trials=(*others, best), effective_share=fit.share, rivals=(), hidden=None
     )
 
 

@@ -7,13 +7,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import (
-    Data,
-    Seen,
-    follows,
-    polished,
-    refit_all,
-)
+from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit_all
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response

@@ -100,12 +100,7 @@ def _transform(residual: Real, bins: int) -> Complex:
 
 
 def misfits(
-    stimulus: Complex,
-    residuals: Complex,
-    *,
-    samples: int,
-    delays: Real,
-    band: tuple[float, float],
+    stimulus: Complex, residuals: Complex, *, samples: int, delays: Real, band: tuple[float, float]
 ) -> tuple[Real, Real]:
     """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
 
@@ -131,12 +126,7 @@ def misfits(
 
 
 def _followed(
-    stimulus: Complex,
-    answers: Complex,
-    *,
-    samples: int,
-    delays: Real,
-    band: tuple[float, float],
+    stimulus: Complex, answers: Complex, *, samples: int, delays: Real, band: tuple[float, float]
 ) -> tuple[Real, Real, Real, int]:
     """Return what one gain in each group of neighbouring bins explains of each answer.
 
