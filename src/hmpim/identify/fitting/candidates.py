@@ -1,6 +1,7 @@
 """Fits of every structure under one assumption: plain ones, and richer ones if needed."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -117,8 +118,11 @@ def fit_plain(
     least = min(fit.objective for fit in fits)
 
     def ended(fit: Fit) -> Fit:
-        if fit.objective > TWICE**2 * least:  # of use as a start at most
-            return fit.bare
+        if fit.objective > TWICE**2 * least:  # of use as a start at most: drop its samples
+            nothing = np.empty(0)
+            return (
+                replace(fit, prediction=nothing, residual=nothing) if fit.prediction.size else fit
+            )
         return fit if fit.converged else refit(problem, fit, precision=_PRECISION / fit.share)
 
     return [ended(fit) for fit in fits]

@@ -9,7 +9,7 @@ input or several, with or without a drift, from rest or in mid-motion.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, singledispatch
 from typing import Protocol
 
@@ -111,11 +111,6 @@ class Fit:
         """B(s) by rising powers of s per sample, shape (zeros + 1,)."""
         coefficients = coefficients_of(self.structure, self.theta[1:])
         return numerator_of(self.structure, coefficients, self.linear[:-1])
-
-    @property
-    def bare(self) -> "Fit":
-        """The same without its samples, for a fit that will only be the start of another."""
-        return replace(self, prediction=np.empty(0), residual=np.empty(0))
 
     @property
     def memory(self) -> float:
@@ -228,7 +223,7 @@ class _Evaluation:
         fixed, problem, residual = weights[-1], self.problems[0], self.residual
         levels = [weights[2 * i][0] * part.level for i, part in enumerate(self.parts)]
         bias = fixed[0] - sum(levels)  # for inputs that rest at zero
-        if problem.noise is not None or problem.whitening is not None:
+        if problem.filtered:
             moved = self.linear[: -fixed.size] @ self.rows
             residual = problem.y - moved - fixed @ self._known.plain
             if problem.valid is not None:

@@ -1,7 +1,7 @@
 """A washout in place of a drift.
 
-Where the input keeps its level, or moved before the record, a washout leaves a slow response
-behind. Plain dynamics and a drift look like it, but the drift knows nothing of the input.
+A washout responds slowly to an input that keeps its level, or moved before the record. Plain
+dynamics and a drift look the same, but the drift does not depend on the input.
 """
 
 import numpy as np
@@ -15,18 +15,18 @@ from hmpim.model.dynamics import STRUCTURES
 __all__ = ["washed_out"]
 
 _SPANS = (0.05, 0.15, 0.5)
-"""Time constants of a washout to begin with, over the record."""
+"""Time constants of a washout in starts, over the record length."""
 
 
 def washed_out(problem: Problem, fit: Fit) -> Fit | None:
-    """Return a plain fit's dynamics with a washout; None if they are not plain.
+    """Fit a plain fit's dynamics with a washout; None if they are not plain.
 
     Parameters
     ----------
     problem : Problem
         The data, without a drift.
     fit : Fit
-        As it ended beside the drift.
+        The fit with the drift.
     """
     if fit.structure.name not in PLAIN:
         return None
