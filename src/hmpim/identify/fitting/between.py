@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.candidates import best_of
-from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Seen, shifted
+from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Fits, Seen, shifted
 from hmpim.identify.fitting.enrich import PLAIN, RICH, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.worth import TWICE
@@ -38,7 +38,7 @@ def fit_under_each_assumption(
     structures: tuple[StructureName, ...],
     *,
     alone: bool,
-) -> list[tuple[Intersample, Fit]]:
+) -> Fits:
     """Add fits under the other assumptions, unless the natural one is `alone`.
 
     Poles and zeros of a rich structure may have made up for a wrong assumption. So plainer
@@ -62,7 +62,7 @@ def fit_under_each_assumption(
             behind.append(fit)
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
-    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+    def moved(some: list[Fit]) -> Fits:
         return [
             (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
             for mode, problem in problems.items()

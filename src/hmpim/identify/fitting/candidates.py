@@ -1,6 +1,6 @@
 """Fits of every structure under one assumption: plain ones, and richer ones if needed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -118,12 +118,11 @@ def fit_plain(
     least = min(fit.objective for fit in fits)
 
     def ended(fit: Fit) -> Fit:
-        if fit.objective > TWICE**2 * least:  # of use as a start at most: drop its samples
-            nothing = np.empty(0)
-            return (
-                replace(fit, prediction=nothing, residual=nothing) if fit.prediction.size else fit
-            )
-        return fit if fit.converged else refit(problem, fit, precision=_PRECISION / fit.share)
+        if fit.objective <= TWICE**2 * least:
+            return fit if fit.converged else refit(problem, fit, precision=_PRECISION / fit.share)
+        if not fit.prediction.size:
+            return fit
+        return replace(fit, prediction=np.empty(0), residual=np.empty(0))  # at most a start
 
     return [ended(fit) for fit in fits]
 
@@ -265,24 +264,20 @@ def sums_to_noise(fits: list[Fit]) -> bool:
     If the output is white, a fit that explains nothing leaves white noise too.
     """
     integrating = [fit for fit in fits if fit.structure.integrators]
-    if not integrating:
-        return False
-    best = min(integrating, key=lambda fit: fit.objective)
-    return best.objective < TWICE * min(fit.objective for fit in fits) and best.is_white
+    best = min(integrating, key=lambda fit: fit.objective, default=None)
+    least = min(fit.objective for fit in fits)
+    return best is not None and best.objective < TWICE * least and best.is_white
 
 
-def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
+def _batches(proposed: list[Proposal]) -> list[list[Proposal]]:
     """Proposals a few at a time: those near the rough response, an empty batch, then the rest.
 
     The empty batch marks the turn of modes in parallel.
     """
     near = [p for p in proposed if p.promising and p.error < PART**2]
     far = [p for p in proposed if p not in near]
-    for start in range(0, len(near), _AT_ONCE):
-        yield near[start : start + _AT_ONCE]
-    yield []
-    for start in range(0, len(far), _AT_ONCE):
-        yield far[start : start + _AT_ONCE]
+    some, rest = ([g[i : i + _AT_ONCE] for i in range(0, len(g), _AT_ONCE)] for g in (near, far))
+    return [*some, [], *rest]
 
 
 def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
@@ -357,17 +352,16 @@ def best_of(
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     tried: list[Fit] = []
     for theta in starts:
-        tried.append(
-            fit_structure(
-                problem,
-                structure,
-                theta,
-                iterations=_LONG_TASTE,
-                precision=precision,
-                hopeless=hopeless,
-            )
+        fit = fit_structure(
+            problem,
+            structure,
+            theta,
+            iterations=_LONG_TASTE,
+            precision=precision,
+            hopeless=hopeless,
         )
-        if tried[-1].converged and tried[-1].is_white:
+        tried.append(fit)
+        if fit.converged and fit.is_white:
             break
     best = min(tried, key=lambda fit: fit.objective)
     if steps_through(structure, held=problem.source.degree == 0):

@@ -18,7 +18,7 @@ from hmpim.identify.fitting.candidates import (
     spans_record,
     sums_to_noise,
 )
-from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -323,23 +323,21 @@ def set_free(course: Course, fit: Fit) -> Course | None:
     return replace(course, others=(), counted=counted, fits=[free], settled=None)
 
 
-def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
+def continue_between(course: Course) -> Fits:
     """All fits, the leading ones also under the other assumptions between the samples."""
     return fit_under_each_assumption(
         course.data, course.natural, course.fits, course.counted, course.others, alone=course.alone
     )
 
 
-def is_unanswered(course: Course, fitted: list[tuple[Intersample, Fit]]) -> bool:
+def is_unanswered(course: Course, fitted: Fits) -> bool:
     """Whether neither the likelihood nor a test without a model finds an answer."""
     mode, best = min(fitted, key=lambda item: item[1].objective)
     problem = course.data.problem(mode, course.counted)
     return course.data.says_nothing(problem, best)
 
 
-def enrich(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[tuple[Intersample, Fit]]]:
+def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     """Fit richer structures while the residual follows the input, then the plain ones again.
 
     A small residual that follows the input counts as missing dynamics only where a richer

@@ -26,6 +26,7 @@ __all__ = [
     "RETURNS",
     "TASTE",
     "Data",
+    "Fits",
     "Seen",
     "follows",
     "hopeless_beside",
@@ -41,6 +42,9 @@ RETURNS = 12
 
 TASTE = 4
 """Steps from each start before the best one is fitted to convergence."""
+
+Fits = list[tuple[Intersample, Fit]]
+"""Fits, each with its assumption between the samples."""
 
 prepared = kept(prepare_input)
 """`hmpim.model.sampled.prepare_input`, its results kept."""
@@ -154,9 +158,7 @@ def polished(problem: Problem, fit: Fit) -> Fit:
     return refit(problem, fit, precision=problem.final)
 
 
-def refit_all(
-    data: Data, fitted: list[tuple[Intersample, Fit]], seen: Seen, *, hopeful: float = np.inf
-) -> list[tuple[Intersample, Fit]]:
+def refit_all(data: Data, fitted: Fits, seen: Seen, *, hopeful: float = np.inf) -> Fits:
     """Fit all structures to other data, from where they ended, the leading one first.
 
     A fit that promises a much larger residual than that one, or no smaller one than a plainer fit

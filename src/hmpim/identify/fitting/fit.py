@@ -362,15 +362,8 @@ def fit_structure(
     Fit
         `converged` is False if the steps ran out.
     """
-    (fit,) = fit_together(
-        [problem],
-        [structure],
-        [theta],
-        iterations=iterations,
-        precision=precision,
-        hopeless=hopeless,
-    )
-    return fit
+    limits = {"precision": precision, "hopeless": hopeless}
+    return fit_together([problem], [structure], [theta], iterations=iterations, **limits)[0]
 
 
 def fit_together(
@@ -382,19 +375,10 @@ def fit_together(
     precision: float = 1e-2,
     hopeless: float = np.inf,
 ) -> list[Fit]:
-    """Fit one output to several inputs at once, each with a structure of its own.
+    """Fit one output to several inputs at once, each with a structure and a start of its own.
 
-    Parameters
-    ----------
-    problems : sequence of Problem
-        One for each input; output, mask, whitening, nuisance and beginning are the first one's.
-    structures, thetas, iterations, precision, hopeless
-        As for `fit_structure`, one structure and start for each input.
-
-    Returns
-    -------
-    list of Fit
-        One for each input, residual and cost common to all.
+    Output, mask, whitening, nuisance and beginning are those of the first problem. The rest is as
+    for `fit_structure`. Returned is a fit for each input, residual and cost common to all.
     """
     problems = list(map(kept_in_sample, problems, structures, thetas))
 

@@ -132,14 +132,8 @@ F = TypeVar("F", bound=Fitted)
 class Growth(Generic[F]):
     """The result of adding poles.
 
-    Parameters
-    ----------
-    grown : tuple
-        Fits that each beat the one before, the best last; empty if none did.
-    rivals : tuple
-        Fits with one more pole that lose only by its price.
-    hidden : HiddenPole
-        The test of the best fit for one more pole.
+    `grown` are fits that each beat the one before, the best last; `rivals` are fits with one more
+    pole that lose only by its price; `hidden` is the test of the best fit for one more pole.
     """
 
     grown: tuple[F, ...]

@@ -12,8 +12,8 @@ record clearly contradicts it.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import look_again
 from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import pruned
@@ -29,7 +29,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, one_more_pole, seen_by_pole
@@ -49,14 +49,14 @@ _LOOKS = 2
 
 
 def joint_fit(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
+    u: Real,
+    y: Real,
     *,
-    valid: NDArray[np.bool_] | None = None,
-    known: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
+    known: Mask | None = None,
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *MODES, *INTEGRATING),
-    nuisance: NDArray[np.float64] | None = None,
+    nuisance: Real | None = None,
     growing: bool = True,
     shared: bool = False,
 ) -> JointFit:
@@ -137,9 +137,7 @@ def settle(
     )
 
 
-def weigh_and_look_again(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[Trial], Trial, float]:
+def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
     """Choose among all fits, and again where the best of them shows that other samples count."""
     course, trials, best, share = _weigh(course, fitted)
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
@@ -207,40 +205,32 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
         if other.grown and other.grown[-1].criterion < led.criterion:
             growth, led = other, other.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    if led is joint.best:
-        return joint
-    plainer = _plainer_than(led, joint, course, structures)
-    best = min([led, *plainer], key=lambda trial: trial.criterion)
-    if best is not led:  # it was not tested for one more pole
-        joint = replace(joint, rivals=(), hidden=None)
-    return _led_by(best, joint, course)
+    return joint if led is joint.best else _led_by(led, joint, course, structures)
 
 
-def _plainer_than(
+def _led_by(
     led: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> list[Trial]:
-    """Plainer trials, started from a grown one: the added pole may lead to new starts for them."""
-    problem = course.data.problem(led.intersample, course.counted)
+) -> JointFit:
+    """The joint fit with a grown trial as the best, polished and under each assumption.
+
+    The added pole may lead to new starts for plainer structures, one of which may be better still.
+    """
+    natural = led.intersample
+    problem = course.data.problem(natural, course.counted)
     count = problem.counted * joint.weighed_share
-    fits = [t.fit for t in joint.trials if t.intersample == led.intersample]
-    found = pruned(problem, fits, structures)
-    return [trial_of(led.intersample, fit, count) for fit in found]
-
-
-def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
-    """The joint fit with another best trial, polished, also fitted under the other assumptions."""
-    weighed = course.data.problem(led.intersample, course.counted)
-    fit = polished(weighed, led.fit)
-    count = weighed.counted * joint.weighed_share
-    best = trial_of(led.intersample, fit, count)
-    trials = [trial for trial in joint.trials if trial is not led]
+    fits = [t.fit for t in joint.trials if t.intersample == natural]
+    plainer = [trial_of(natural, fit, count) for fit in pruned(problem, fits, structures)]
+    chosen = min([led, *plainer], key=lambda trial: trial.criterion)
+    fit = polished(problem, chosen.fit)
+    trials = [trial for trial in joint.trials if trial is not chosen]
     for mode in () if course.alone else BETWEEN:
-        if mode != best.intersample:
-            problem = course.data.problem(mode, course.counted)
-            moved = refit_between(problem, fit, best.intersample, mode)
-            trials.append(trial_of(mode, moved, count))
-    trials.append(best)
-    fresh = settle(course, trials, best, joint.effective_share)
+        if mode != natural:
+            other = course.data.problem(mode, course.counted)
+            trials.append(trial_of(mode, refit_between(other, fit, natural, mode), count))
+    best = trial_of(natural, fit, count)
+    fresh = settle(course, [*trials, best], best, joint.effective_share)
+    if chosen is not led:  # it was not tested for one more pole
+        return fresh
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 
 
@@ -300,16 +290,14 @@ def _grown_from(
     )
 
 
-def give_up(course: Course, fitted: list[tuple[Intersample, Fit]]) -> JointFit:
+def give_up(course: Course, fitted: Fits) -> JointFit:
     """The plain fits, for an output that no model explains."""
     share = min((fit for _, fit in fitted), key=lambda f: f.objective).share
     trials = [trial_of(mode, fit, course.problem.counted * share) for mode, fit in fitted]
     return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
-def _weigh(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[Trial], Trial, float]:
+def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
     """Compare all fits under one noise model; the course with it, trials, best, effective share."""
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)
@@ -325,9 +313,7 @@ def _weigh(
     return course, trials, best, share
 
 
-def _decide(
-    course: Course, fitted: list[tuple[Intersample, Fit]], share: float
-) -> tuple[list[Trial], Trial]:
+def _decide(course: Course, fitted: Fits, share: float) -> tuple[list[Trial], Trial]:
     """All trials, and the chosen one among them, polished."""
     count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]

@@ -24,15 +24,11 @@ _NONE = np.empty((0, 0), dtype=np.complex128)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Expansion:
-    """Partial fractions: the weights of which rows are sums.
+    """Partial fractions: rows as weights of simple responses.
 
-    Parameters
-    ----------
-    simple, double : complex ndarray, shape (rows, k)
-        Weights of the responses of 1/(s - p) and 1/(s - p)², for one of each conjugate pair: the
-        rows are the real parts. Rows of B/A itself have no `double`.
-    direct, rate : ndarray, shape (rows,)
-        Weights of the input itself and of its rate. `rate` is None where all are 0.
+    `simple` and `double`, (rows, k), are weights of the responses of 1/(s - p) and 1/(s - p)², for
+    one of each conjugate pair: the rows are the real parts. Rows of B/A itself have no `double`.
+    `direct` and `rate`, (rows,), are weights of the input itself and of its rate; None if all 0.
     """
 
     simple: Complex

@@ -100,14 +100,14 @@ class _Equations:
         """Whether the equation error of a structure is no more than allowed at some delay."""
         return any(cost <= allowed for cost, _ in self.costs(structure).values())
 
-    def spans(self, allowed: float) -> bool:
-        """Whether all lagged inputs together have an equation error no more than allowed."""
-        return self.cost(_transversal(self.count), self.first)[0] <= allowed
+    def transversal_cost(self, first: int, last: int) -> float:
+        """Least sum of squares of the equation error with input samples first to last alone."""
+        return self.cost(_transversal(last - first + 1), first)[0]
 
     @property
-    def spread(self) -> float:
-        """Sum of squares of the output about its mean."""
-        return self.cost(_transversal(0), self.first)[0]
+    def last(self) -> int:
+        """The greatest lag of the input."""
+        return self.first + self.count - 1
 
     @property
     def left(self) -> float:
@@ -185,7 +185,8 @@ def is_exact(u: Real, y: Real) -> bool:
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True
     every = _equations(u, y, None)
-    return every.foreseen() >= ROUNDING and every.spans(allowed * every.rows / equations.rows)
+    left = every.transversal_cost(every.first, every.last)
+    return every.foreseen() >= ROUNDING and left <= allowed * every.rows / equations.rows
 
 
 def software_fit(
@@ -328,18 +329,19 @@ def _long_filter(
     allowed = exact * equations.rows / problem.counted
 
     def holds(first: int, last: int) -> bool:
-        return equations.cost(_transversal(last - first + 1), first)[0] <= allowed
+        return equations.transversal_cost(first, last) <= allowed
 
-    first, last = equations.first, equations.first + equations.count - 1
-    if not equations.spans(allowed):
+    first, last = equations.first, equations.last
+    if not holds(first, last):
         return None
     last = first + bisect_left(range(first, last), True, key=lambda k: holds(first, k))
     first += bisect_left(range(first, last), True, key=lambda k: not holds(k + 1, last))
     if last - first >= _LONGEST:
         return None
     taken = slice(first - equations.first, last + 1 - equations.first)
-    cost = equations.cost(_transversal(last - first + 1), first)[0]
-    if np.sqrt(cost / equations.spread) > TOLERATED * equations.foreseen(taken):
+    spread = equations.transversal_cost(equations.first, equations.first - 1)  # of the output
+    share = equations.transversal_cost(first, last) / spread
+    if np.sqrt(share) > TOLERATED * equations.foreseen(taken):
         return None
     began = _begun_at(problem, _unknown(u, last))
     return began, [fit_structure(began, _transversal(last - first + 1), np.array([float(first)]))]

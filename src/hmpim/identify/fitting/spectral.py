@@ -109,28 +109,24 @@ def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tupl
     (k, order + 1), by rising powers of s over the highest frequency, A(0) = 1.
     """
     order, first, last = structure.order, structure.dc_zeros, structure.zeros
-    above = np.arange(first, last + 1)
+    above, below = np.arange(first, last + 1), np.arange(order + 1)
+    rows, split = np.append(below, above), order + 1
+    grid, turn = rows[:, None] + rows, (1j ** np.arange(-8, 9))[rows - rows[:, None] + 8]
     x = rough.omega / rough.omega[-1]
     powers = x ** np.arange(2 * max(order, last) + 1)[:, None]
     target = rough.response * np.exp(1j * rough.omega * (delays[:, None] - rough.lag))
     size = np.abs(rough.response) ** 2
-    below = np.arange(order + 1)
-    turns = 1j ** np.arange(-8, 9)
     weight = np.broadcast_to(rough.weight, target.shape)
     errors, best = np.full(delays.size, np.inf), np.ones((delays.size, order + 1))
     for _ in range(_REWEIGHTINGS):
         own = (weight * size) @ powers.T
         fixed = weight @ powers.T
         mixed = (weight * target.conj()) @ powers.T
-        grid = below[:, None] + below
-        gram = np.empty((delays.size, order + 1 + above.size, order + 1 + above.size))
-        gram[:, : order + 1, : order + 1] = own[:, grid] * turns[below - below[:, None] + 8].real
-        grid = above[:, None] + above
-        gram[:, order + 1 :, order + 1 :] = fixed[:, grid] * turns[above - above[:, None] + 8].real
-        grid = below[:, None] + above
-        across = -(mixed[:, grid] * turns[above - below[:, None] + 8]).real
-        gram[:, : order + 1, order + 1 :] = across
-        gram[:, order + 1 :, : order + 1] = across.swapaxes(1, 2)
+        across = -(mixed[:, grid[:split, split:]] * turn[:split, split:]).real
+        gram = np.empty((delays.size, rows.size, rows.size))
+        gram[:, :split, :split] = own[:, grid[:split, :split]] * turn[:split, :split].real
+        gram[:, split:, split:] = fixed[:, grid[split:, split:]] * turn[split:, split:].real
+        gram[:, :split, split:], gram[:, split:, :split] = across, across.swapaxes(1, 2)
         scale = np.sqrt(np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny))
         scaled = _ridged(gram / (scale[:, :, None] * scale[:, None, :]))
         found = np.linalg.solve(scaled[:, 1:, 1:], -scaled[:, 1:, :1])[..., 0]

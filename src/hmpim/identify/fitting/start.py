@@ -193,9 +193,7 @@ def _turned(turns: NDArray[np.int64], length: int) -> Complex:
     return np.asarray(np.exp(2j * np.pi / length * (turns % length)))
 
 
-def _at_shifts(
-    rough: RoughResponse, rows: Complex, shifts: NDArray[np.intp], finer: int
-) -> NDArray[np.float64]:
+def _at_shifts(rough: RoughResponse, rows: Complex, shifts: NDArray[np.intp], finer: int) -> Real:
     """Real parts of Σ rows e^(jω shift/finer) over the bins, at neighbouring shifts, (..., k)."""
     length, first = rough.length * finer, int(rough.bins[0])
     count = int(rough.bins[-1]) - first + 1

@@ -7,7 +7,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit_all
+from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit_all
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
@@ -60,9 +60,7 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     return replace(data, noise=noise, level=level)
 
 
-def refit_whitened(
-    data: Data, fitted: list[tuple[Intersample, Fit]], seen: Seen
-) -> list[tuple[Intersample, Fit]]:
+def refit_whitened(data: Data, fitted: Fits, seen: Seen) -> Fits:
     """Refit all fits under one noise model, but only evaluate hopeless ones."""
     least = min(fit.objective for _, fit in fitted)
     return refit_all(data, fitted, seen, hopeful=TWICE * least)
