@@ -7,9 +7,9 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Data, Seen
+from hmpim.identify.fitting.data import Data, Seen, refit
 from hmpim.identify.fitting.derivatives import products
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
@@ -133,7 +133,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
         return None
     # The free response itself may colour the residual: only its own residual is noise.
     begun = replace(problem, valid=valid, begins=begins)
-    free = fit_structure(begun, fit.structure, fit.theta)
+    free = refit(begun, fit)
     if free.objective <= 0.0:
         return begins
     statistic = free.share * count * float(np.log(power) - np.log(free.objective))

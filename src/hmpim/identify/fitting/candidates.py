@@ -14,10 +14,10 @@ from hmpim.identify.fitting.enrich import (
     MODES,
     RICH,
     Proposal,
-    about,
     integrator_starts,
     members,
     proposals,
+    with_fit,
     without_fast,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -223,7 +223,7 @@ def _climbed(
             return found
     if shared or best.structure.integrators:
         return found
-    for p in proposals(about(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
+    for p in proposals(with_fit(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
         fit = climbed(p)
         same = [f for f in found if f.structure == p.structure]
         if any(f.objective <= fit.objective for f in same):

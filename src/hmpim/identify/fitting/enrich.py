@@ -22,11 +22,11 @@ __all__ = [
     "PLAIN",
     "RICH",
     "Proposal",
-    "about",
     "integrator_starts",
     "is_response",
     "members",
     "proposals",
+    "with_fit",
     "without_fast",
 ]
 
@@ -164,12 +164,12 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
     return np.concatenate([[late], theta_of(structure, coefficients)])
 
 
-def about(left: RoughResponse, fit: Fit) -> RoughResponse:
+def with_fit(residual: RoughResponse, fit: Fit) -> RoughResponse:
     """The rough response of an output, from that of a fit's residual.
 
     Leakage is proportional to the transformed signal, so a residual has little.
     """
-    return replace(left, response=_modelled(left, fit) + left.response)
+    return replace(residual, response=_modelled(residual, fit) + residual.response)
 
 
 def _modelled(rough: RoughResponse, fit: Fit) -> Complex:

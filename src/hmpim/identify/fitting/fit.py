@@ -375,10 +375,19 @@ def fit_together(
     precision: float = 1e-2,
     hopeless: float = np.inf,
 ) -> list[Fit]:
-    """Fit one output to several inputs at once, each with a structure and a start of its own.
+    """Fit one output to several inputs at once, each with a structure of its own.
 
-    Output, mask, whitening, nuisance and beginning are those of the first problem. The rest is as
-    for `fit_structure`. Returned is a fit for each input, residual and cost common to all.
+    Parameters
+    ----------
+    problems : sequence of Problem
+        One for each input; output, mask, whitening, nuisance and beginning are the first one's.
+    structures, thetas, iterations, precision, hopeless
+        As for `fit_structure`, one structure and start for each input.
+
+    Returns
+    -------
+    list of Fit
+        One for each input, residual and cost common to all.
     """
     problems = list(map(kept_in_sample, problems, structures, thetas))
 

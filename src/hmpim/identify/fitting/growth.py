@@ -100,7 +100,7 @@ class HiddenPole:
         return float(np.sqrt(max(self.squared, 0.0) + HALF * self.std))
 
     @property
-    def is_asked_for(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether a further pole is significant, and slow enough to matter."""
         return self.squared > ONE_SIDED * self.std and self.squared > (MATERIAL * self.scale) ** 2
 
@@ -356,7 +356,7 @@ def grow(
     while True:
         test = hidden(best)
         structure = best.fit.structure
-        if not test.is_asked_for or structure.order >= _MOST:
+        if not test.is_significant or structure.order >= _MOST:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         richer = one_more_pole(structure)
         starts = [float(np.sqrt(test.squared))]

@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.fitting.data import Data
+from hmpim.identify.fitting.data import Data, refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.spectral import condensed, fitted_roughly, left_roughly
+from hmpim.identify.fitting.spectral import condensed, fitted_roughly, residual_of
 from hmpim.identify.fitting.start import RoughResponse, local_minima
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
@@ -75,7 +75,7 @@ def grown_modes(
         if best is None or best.objective > TWICE * hopeless:
             break
         if not best.converged:
-            best = found[best.structure] = fit_structure(problem, best.structure, best.theta)
+            best = found[best.structure] = refit(problem, best)
         if best.is_white:
             return [*found.values(), *_with_fewer(problem, rough, best, structures)]
         delay = best.delay
@@ -132,7 +132,7 @@ def _grown(
         if not known and fit.error < TWICE * leading.error:
             leading, shape = fit, gains
         theta, least = leading.likely[0], error
-        residual = left_roughly(rough, shape, theta)
+        residual = residual_of(rough, shape, theta)
     least = min((error for error, _ in found.values()), default=0.0)
     return {s: theta for s, (error, theta) in found.items() if PART**2 * error <= least}
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import EXCLUDED
-from hmpim.identify.fitting.fit import Fit, fit_structure
+from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.model.dynamics import STRUCTURES
 
 __all__ = ["widened"]
 
@@ -35,21 +35,14 @@ def widened(joint: JointFit, cov: Real) -> Real:
     -------
     ndarray, shape (p, p)
     """
-    fit, problem = joint.best.fit, joint.weighed
-    simple = next(
-        (
-            trial.fit
-            for trial in joint.trials
-            if trial.fit.structure.name == "first_order"
-            and trial.intersample == joint.best.intersample
-        ),
-        None,
-    )
+    fit = joint.best.fit
+    alike = (t.fit for t in joint.trials if t.intersample == joint.best.intersample)
+    simple = next((other for other in alike if other.structure.name == "first_order"), None)
     if fit.structure.name != "second_order" or simple is None or not np.isfinite(cov).all():
         return cov
     if _deviance(simple, joint) > 2 * EXCLUDED:
         return cov
-    simple = fit_structure(problem, STRUCTURES["first_order"], simple.theta)
+    simple = refit(joint.weighed, simple)
     deviance = _deviance(simple, joint)
     if deviance > EXCLUDED:
         return cov

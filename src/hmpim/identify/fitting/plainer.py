@@ -50,13 +50,9 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
     """
     if fit is joint.best.fit:
         return joint
-    mode = joint.best.intersample
+    mode, name = joint.best.intersample, fit.structure.name
     best = trial_of(mode, fit, joint.problem.counted * joint.effective_share)
-    others = [
-        trial
-        for trial in joint.trials
-        if (trial.fit.structure.name, trial.intersample) != (fit.structure.name, mode)
-    ]
+    others = [t for t in joint.trials if (t.fit.structure.name, t.intersample) != (name, mode)]
     return replace(
         joint, best=best, trials=(*others, best), effective_share=fit.share, rivals=(), hidden=None
     )
@@ -77,16 +73,10 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
     def better(fit: Fit) -> Fit:
         if fit.objective <= TWICE * best.objective:
             return fit
-        tried = [
-            fit_structure(
-                problem,
-                fit.structure,
-                np.concatenate([[late - c[0]], theta]),
-                hopeless=fit.objective,
-            )
-            for theta, c in sections
-            if fit.structure.sections == (c.size,)
-        ]
+        own = [(theta, c) for theta, c in sections if fit.structure.sections == (c.size,)]
+        starts = [np.append(late - c[0], theta) for theta, c in own]
+        limit = fit.objective
+        tried = [fit_structure(problem, fit.structure, t, hopeless=limit) for t in starts]
         return min([fit, *tried], key=lambda f: f.objective)
 
     return [better(fit) for fit in fits]

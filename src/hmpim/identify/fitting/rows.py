@@ -166,14 +166,10 @@ class Problem:
 
 
 class Driven:
-    """Responses to the input, one for each coefficient of the numerator.
+    """Responses to the input, `rows`, (m, n), one for each coefficient of the numerator.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (m, n)
-        One response for each coefficient, without `level`.
-    level : float
-        Constant that the scale factor multiplies in addition: nearly collinear with the bias.
+    `level` is a constant that the scale factor multiplies in addition. As part of a row it would
+    make that nearly collinear with the bias.
     """
 
     rows: Real
@@ -292,8 +288,6 @@ def _powers(structure: Structure) -> Real:
 
     For sections in parallel, as in `Parallel`: the first alone, and each other less the first.
     """
-    if structure.parallel and structure.zeros == structure.order - 1:
-        return np.eye(structure.order)
     if structure.parallel:
         gains = np.zeros((len(structure.sections), structure.order))
         gains[:, ::2] = np.eye(len(structure.sections))

@@ -40,21 +40,12 @@ class Expansion:
 class Poles:
     """Poles of a structure at given parameters, in samples.
 
-    Parameters
-    ----------
-    every : complex ndarray, shape (order + integrators,)
-        All poles.
-    section : list of int
-        The section of each pole; -1 for an integrator.
-    coefficients : sequence of ndarray
-        c₁ (and c₂) of each section.
+    `every`, (integrators + order,), are all poles, those of integrators first, and `coefficients`
+    are c₁ (and c₂) of each section.
     """
 
-    def __init__(
-        self, every: Complex, section: Sequence[int], coefficients: Sequence[Real]
-    ) -> None:
+    def __init__(self, every: Complex, coefficients: Sequence[Real]) -> None:
         self.every, self.coefficients = every, coefficients
-        self._first = sum(k < 0 for k in section)
         self._kept = np.flatnonzero(every.imag >= 0.0)
         self.upper = every[self._kept]
         """One of each conjugate pair."""
@@ -95,7 +86,7 @@ class Poles:
         """1/Aₖ times the derivative of Aₖ by each parameter: residues and direct terms."""
         rows = sum(c.size for c in self.coefficients)
         factors = np.zeros((rows, self.every.size), dtype=np.complex128)
-        fed, row, at = np.ones(rows), 0, self._first
+        fed, row, at = np.ones(rows), 0, self.every.size - rows
         for c in self.coefficients:
             p = complex(self.every[at])
             if c.size == 1:
@@ -165,14 +156,7 @@ def _blocks(parts: list[Complex]) -> Complex:
 
 
 def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
-    """Poles of a structure at the parameters of its sections.
-
-    Parameters
-    ----------
-    structure : Structure
-        The sections.
-    theta : ndarray, shape (order,)
-        As for `hmpim.model.dynamics.coefficients_of`, time in samples.
+    """Poles of a structure at the parameters of its sections, (order,), time in samples.
 
     Examples
     --------
@@ -183,19 +167,17 @@ def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
     """
     flat = coefficients_of(structure, theta)
     every = [0.0 + 0.0j] * structure.integrators
-    section = [-1] * structure.integrators
     coefficients, start = [], 0
-    for k, order in enumerate(structure.sections):
+    for order in structure.sections:
         c = flat[start : start + order]
         every += [complex(-1.0 / c[0])] if order == 1 else _pair(c[0], c[1])
-        section += [k] * order
         coefficients.append(c)
         start += order
     poles = np.array(every, dtype=np.complex128)
     if structure.parallel:
         pairs = zip(poles.reshape(-1, 2), coefficients, strict=True)
-        return Parallel(sections=tuple(Poles(pair, [0, 0], [c]) for pair, c in pairs))
-    return Poles(parted(poles), section, coefficients)
+        return Parallel(sections=tuple(Poles(pair, [c]) for pair, c in pairs))
+    return Poles(parted(poles), coefficients)
 
 
 def _pair(c1: float, c2: float) -> list[complex]:

@@ -110,11 +110,11 @@ class _Equations:
         return self.first + self.count - 1
 
     @property
-    def left(self) -> float:
+    def cost_of_all(self) -> float:
         """Sum of squares of the equation error with all lagged samples."""
         return solved_exactly(self.factor[:, :-1].T, self.factor[:, -1])[1]
 
-    def foreseen(self, taps: slice = slice(None)) -> float:
+    def predictability(self, taps: slice = slice(None)) -> float:
         """Least over greatest singular value of the lagged inputs, each scaled to unit size.
 
         `taps` selects some of them, counted from `first`.
@@ -180,13 +180,13 @@ def is_exact(u: Real, y: Real) -> bool:
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
         allowed = ROUNDING**2 * float(y.var()) * equations.rows
-        if not equations.left < allowed:
+        if not equations.cost_of_all < allowed:
             return False
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True
     every = _equations(u, y, None)
-    left = every.transversal_cost(every.first, every.last)
-    return every.foreseen() >= ROUNDING and left <= allowed * every.rows / equations.rows
+    cost = every.transversal_cost(every.first, every.last)
+    return every.predictability() >= ROUNDING and cost <= allowed * every.rows / equations.rows
 
 
 def software_fit(
@@ -231,7 +231,9 @@ def _software_fit(
     floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
-    if first.cost > floor and equations.left <= floor:  # exact but for input before the record
+    if (
+        first.cost > floor and equations.cost_of_all <= floor
+    ):  # exact but for input before the record
         problem = _begun_at(problem, _unknown(u, equations.first + equations.count))
         fits = _followed(problem, equations, u, names, exact=floor)
     elif first.cost > floor and (begins := begins_of(problem, first, lag=0)) is not None:
@@ -341,7 +343,7 @@ def _long_filter(
     taken = slice(first - equations.first, last + 1 - equations.first)
     spread = equations.transversal_cost(equations.first, equations.first - 1)  # of the output
     share = equations.transversal_cost(first, last) / spread
-    if np.sqrt(share) > TOLERATED * equations.foreseen(taken):
+    if np.sqrt(share) > TOLERATED * equations.predictability(taken):
         return None
     began = _begun_at(problem, _unknown(u, last))
     return began, [fit_structure(began, _transversal(last - first + 1), np.array([float(first)]))]

@@ -15,7 +15,7 @@ from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.worth import MUCH, TWICE
 from hmpim.model.dynamics import Structure
 
-__all__ = ["RoughFits", "condensed", "fitted_roughly", "left_roughly", "reweighted"]
+__all__ = ["RoughFits", "condensed", "fitted_roughly", "residual_of", "reweighted"]
 
 _ALONE = 128
 """Bins up to this one stay single; each octave above is condensed into half as many."""
@@ -142,10 +142,10 @@ def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tupl
     return errors, best
 
 
-def left_roughly(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
+def residual_of(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
     """Residual of a rough response for a structure at given parameters, (1 + order,)."""
-    left = _Rough(rough, structure, theta[None]).left[0].view(np.complex128)
-    response = np.asarray(left / np.sqrt(rough.weight), dtype=np.complex128)
+    weighted = _Rough(rough, structure, theta[None]).residuals[0].view(np.complex128)
+    response = np.asarray(weighted / np.sqrt(rough.weight), dtype=np.complex128)
     return replace(rough, response=response)
 
 
@@ -173,8 +173,8 @@ class _Rough:
         target = _real(rough.response * root)
         self._gram = _ridged(self._real @ self._real.swapaxes(1, 2))
         self.linear = np.linalg.solve(self._gram, self._real @ target[:, None])[..., 0]
-        self.left = target - (self.linear[:, None, :] @ self._real)[:, 0]
-        errors = np.vecdot(self.left, self.left)
+        self.residuals = target - (self.linear[:, None, :] @ self._real)[:, 0]
+        errors = np.vecdot(self.residuals, self.residuals)
         self.errors = np.where(np.isfinite(errors), errors, np.inf)
 
     def steps(self, damping: Real) -> Real:
@@ -194,7 +194,7 @@ class _Rough:
         # For a direction that the numerator explains fully, only rounding remains, of either sign.
         least = np.finfo(float).eps * np.einsum("kii->ki", normal) + np.finfo(float).tiny
         normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
-        moment = rows @ self.left[..., None]
+        moment = rows @ self.residuals[..., None]
         diagonal = np.maximum(np.einsum("kii->ki", normal), least)
         scale = np.sqrt(diagonal)
         scaled = normal / (scale[:, :, None] * scale[:, None, :])
@@ -205,7 +205,7 @@ class _Rough:
     def unless(self, better: Mask, before: "_Rough") -> "_Rough":
         """The same, with the state before where this one is not better."""
         if not better.all():
-            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "left"):
+            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "residuals"):
                 getattr(self, name)[~better] = getattr(before, name)[~better]
             self._sections = _sections(self.structure, self.thetas, self._s)
         return self
