@@ -77,8 +77,9 @@ def _of_measured(fit: Fit, counted: Mask, known: Mask) -> Mask:
     """
     residual = fit.residual
     reach = min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, residual.size // 4)
+    unknown, index = np.concatenate([[0], np.cumsum(~known)]), np.arange(known.size)
     while True:
-        clear = counted & _unaffected(known, reach)
+        clear = counted & (unknown[index + 1] == unknown[np.maximum(index - reach, 0)])
         few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
         if few or _precision(residual[clear]) <= _precision(residual[counted]):
             return counted
@@ -272,10 +273,3 @@ def stand_out_of(innovations: Real, some: Mask) -> Mask:
     white = are_white(np.where(some[out], 0.0, innovations[out]))
     out[out] = white | (power > TWICE * limit)[out]
     return out
-
-
-def _unaffected(known: Mask, memory: int) -> Mask:
-    """Samples whose output depends on measured input alone."""
-    unknown = np.concatenate([[0], np.cumsum(~known)])
-    index = np.arange(known.size)
-    return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])

@@ -119,13 +119,8 @@ def start(
     if intersample is None and looks_held(u):
         intersample = "zoh"  # only a held input stands still and jumps
     natural: Intersample = "bandlimited" if intersample is None else intersample
-    data = Data(
-        u=u,
-        y=y,
-        sources={},
-        rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
-        nuisance=nuisance,
-    )
+    rough = rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size))
+    data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance)
     course = begun(data, natural, structures, Seen(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
     return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
@@ -360,8 +355,8 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
         # If it is at rest after all, the structure was wrong, and not the beginning.
-        rests = resting.begins is None
-        counted = resting if rests else begin_later(course.counted, leading)
+        at_rest = resting.begins is None
+        counted = resting if at_rest else begin_later(course.counted, leading)
         if counted is not None:
             course = replace(course, counted=counted)
             every = _again(course, [*fits, *richer])
@@ -399,7 +394,8 @@ def looks_held(u: Real) -> bool:
     jumps = np.abs(np.diff(u))
     moves = jumps > 0
     count = int(np.count_nonzero(moves))
-    if count > _LEVELS and _has_few_levels(u):
+    some = u[:: u.size // _SOME + 1]  # these are checked first
+    if count > _LEVELS and all(np.unique(values).size <= _LEVELS for values in (some, u)):
         return True
     if 2 * count > moves.size + 1:
         return False
@@ -408,9 +404,3 @@ def looks_held(u: Real) -> bool:
         return False
     rounded = median(jumps[alone]) <= TWICE * float(jumps[moves].min())
     return bool(jumps.max() > FEW * np.ptp(u) or not rounded)
-
-
-def _has_few_levels(u: Real) -> bool:
-    """Whether an input has at most three levels; a few samples are checked first."""
-    some = u[:: u.size // _SOME + 1]
-    return np.unique(some).size <= _LEVELS and np.unique(u).size <= _LEVELS

@@ -304,10 +304,8 @@ def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:
 
     Parameters
     ----------
-    fit : Fit
-        Without it.
-    hidden : HiddenPole
-        The result of `hidden_pole`.
+    fit, hidden
+        As for `as_if_hidden`.
     """
     lead = float(np.sqrt(max(-hidden.squared, 0.0) + HALF * hidden.std))
     moved = -(lead**2) * hidden.shift

@@ -151,14 +151,10 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
             break
         again = again or seen
         course = replace(course, counted=again, data=(finer or course).data.plain)
-        chosen = (best.intersample, best.fit.structure)
-        hopeful = [(best.intersample, best.fit)] + [
-            (mode, fit)
-            for mode, fit in fitted
-            if (mode, fit.structure) != chosen
-            and (fit.cost < TWICE**2 * best.fit.cost or fit.structure.name in PLAIN)
-        ]
-        fitted = refit_all(course.data, hopeful, again)
+        chosen, most = (best.intersample, best.fit.structure), TWICE**2 * best.fit.cost
+        others = [(mode, fit) for mode, fit in fitted if (mode, fit.structure) != chosen]
+        others = [(m, f) for m, f in others if f.cost < most or f.structure.name in PLAIN]
+        fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
 
@@ -240,18 +236,13 @@ def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
     If the best has zeros, instead of it the one with a pole fewer: a fit with zeros from its own
     start may have ended elsewhere.
     """
-    hopeful = [
-        trial
-        for trial in joint.trials
-        if trial.intersample == natural
-        and trial.fit.objective < TWICE * joint.best.fit.objective
-        and trial.fit.structure.integrators == joint.best.fit.structure.integrators
-    ]
+    own, most = joint.best.fit.structure, TWICE * joint.best.fit.objective
+    hopeful = [t for t in joint.trials if t.intersample == natural and t.fit.objective < most]
+    hopeful = [t for t in hopeful if t.fit.structure.integrators == own.integrators]
     found = []
     for with_zeros in (False, True):
         alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
         if joint.best in alike:
-            own = joint.best.fit.structure
             alike = [t for t in alike if with_zeros and one_more_pole(t.fit.structure) == own]
         if alike:
             found.append(min(alike, key=lambda trial: trial.criterion))

@@ -34,7 +34,7 @@ class Expansion:
     simple: Complex
     double: Complex
     direct: Real
-    rate: Real | None
+    rate: Real | None = None
 
 
 class Poles:
@@ -57,7 +57,7 @@ class Poles:
     def expand(self, numerators: Real) -> Expansion:
         """Rows of B(s)/A(s), one for each row of `numerators`, by rising powers of s."""
         residues, constants = fractions(numerators, self.every, self._steepness, self._leading)
-        return Expansion(simple=self._halved(residues), double=_NONE, direct=constants, rate=None)
+        return Expansion(simple=self._halved(residues), double=_NONE, direct=constants)
 
     def slopes(self, numerator: Real) -> Expansion:
         """Rows of the derivatives of B(s)/A(s): by the delay, then by the sections' parameters.
@@ -128,26 +128,19 @@ class Parallel:
         """Rows of the sum, one for each row of `numerators`, shape (rows, 2 sections)."""
         split = np.split(numerators, len(self.sections), axis=1)
         expanded = [one.expand(n) for one, n in zip(self.sections, split, strict=True)]
-        return Expansion(
-            simple=np.hstack([e.simple for e in expanded]),
-            double=_NONE,
-            direct=np.zeros(numerators.shape[0]),
-            rate=None,
-        )
+        simple, direct = np.hstack([e.simple for e in expanded]), np.zeros(numerators.shape[0])
+        return Expansion(simple=simple, double=_NONE, direct=direct)
 
     def slopes(self, numerator: Real) -> Expansion:
         """Rows of the derivatives by the delay, then by the sections' parameters."""
         split = np.split(numerator, len(self.sections))
         own = [one.slopes(n) for one, n in zip(self.sections, split, strict=True)]
         direct = np.concatenate([[sum(e.direct[0] for e in own)], *(e.direct[1:] for e in own)])
-        return Expansion(
-            simple=np.vstack(
-                [np.hstack([e.simple[:1] for e in own]), _blocks([e.simple[1:] for e in own])]
-            ),
-            double=_blocks([np.zeros((1, 0), dtype=np.complex128), *(e.double[1:] for e in own)]),
-            direct=direct,
-            rate=None,
-        )
+        by_delay = np.hstack([e.simple[:1] for e in own])
+        simple = np.vstack([by_delay, _blocks([e.simple[1:] for e in own])])
+        none = np.zeros((1, 0), dtype=np.complex128)
+        double = _blocks([none, *(e.double[1:] for e in own)])
+        return Expansion(simple=simple, double=double, direct=direct)
 
 
 def _blocks(parts: list[Complex]) -> Complex:

@@ -151,14 +151,13 @@ def rough_response(
     if lag and not power.any():  # the input stands still in the overlap
         return rough_response(u, y, longest_delay=longest_delay, lag=0)
     bins = np.flatnonzero(power > _FLOOR**2 * power.max())
-    weight = power[bins] / power.max()
     return RoughResponse(
         lag=lag,
         length=length,
         bins=bins,
         omega=2 * np.pi * bins / length,
         response=cross[bins] / power[bins],
-        weight=weight,
+        weight=power[bins] / power.max(),
         ahead=ahead,
     )
 

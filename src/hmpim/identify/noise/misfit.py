@@ -54,14 +54,10 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
         return lines
     stimulus = transform_of(u)
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
-    share, probability = misfits(
-        stimulus[:bins],
-        _transform(residual, bins)[None],
-        samples=u.size,
-        delays=np.array([delay]),
-        band=band,
-    )
-    return Misfit(share=float(share[0]), probability=float(probability[0]))
+    spectra, delays = _transform(residual, bins)[None], np.array([delay])
+    found = misfits(stimulus[:bins], spectra, samples=u.size, delays=delays, band=band)
+    share, probability = (float(values[0]) for values in found)
+    return Misfit(share=share, probability=probability)
 
 
 def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
@@ -167,12 +163,9 @@ def unexplained_response(
     >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
     0.1
     """
+    answers, delays = np.asarray(scipy.fft.rfft(np.stack([y, residual]))), np.full(2, delay)
     power, taken, total, width = _followed(
-        transform_of(u),
-        np.asarray(scipy.fft.rfft(np.stack([y, residual]))),
-        samples=u.size,
-        delays=np.full(2, delay),
-        band=band,
+        transform_of(u), answers, samples=u.size, delays=delays, band=band
     )
     excited = power > 0.0
     noise = np.maximum(total - taken, 0.0) / (width - 1)

@@ -44,12 +44,10 @@ def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) ->
     if lags <= _FEW_LAGS:  # block by block, to stay in the cache for all lags
         r = np.zeros((*residual.shape[:-1], lags + 1))
         for row in np.ndindex(residual.shape[:-1]):
+            padded = np.append(residual[row], np.zeros(lags))
             for start in range(0, n, _BLOCK):
                 block = residual[row][start : start + _BLOCK]
-                followed = residual[row][start : start + block.size + lags]
-                if followed.size < block.size + lags:  # zeros follow the last block
-                    followed = np.append(followed, np.zeros(block.size + lags - followed.size))
-                r[row] += np.correlate(followed, block)
+                r[row] += np.correlate(padded[start : start + block.size + lags], block)
         return np.asarray(r / n)
     length = scipy.fft.next_fast_len(n + lags + 1, real=True)
     power = np.abs(scipy.fft.rfft(residual, length)) ** 2
