@@ -208,10 +208,13 @@ def _climbed(
     def explains(fit: Fit) -> bool:
         return owed_to_input(problem, fit, data) <= MATERIAL and fit.is_white
 
-    for some in _batches(proposed):
-        for p in some:
+    near = [p for p in proposed if p.promising and p.error < PART**2]
+    far = [p for p in proposed if p not in near]
+    some, rest = ([g[i : i + _AT_ONCE] for i in range(0, len(g), _AT_ONCE)] for g in (near, far))
+    for batch in [*some, [], *rest]:
+        for p in batch:
             found.append(climbed(p))
-        if not some:
+        if not batch:  # modes in parallel after the proposals near the rough response
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
             hopeless = PART * best.objective
@@ -267,17 +270,6 @@ def sums_to_noise(fits: list[Fit]) -> bool:
     best = min(integrating, key=lambda fit: fit.objective, default=None)
     least = min(fit.objective for fit in fits)
     return best is not None and best.objective < TWICE * least and best.is_white
-
-
-def _batches(proposed: list[Proposal]) -> list[list[Proposal]]:
-    """Proposals a few at a time: those near the rough response, an empty batch, then the rest.
-
-    The empty batch marks the turn of modes in parallel.
-    """
-    near = [p for p in proposed if p.promising and p.error < PART**2]
-    far = [p for p in proposed if p not in near]
-    some, rest = ([g[i : i + _AT_ONCE] for i in range(0, len(g), _AT_ONCE)] for g in (near, far))
-    return [*some, [], *rest]
 
 
 def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:

@@ -58,9 +58,7 @@ class SampledPart(Driven):
         turned = -scipy.signal.lfilter(np.ones(1), self._below, forced + free)
         later = [np.concatenate([np.zeros(k), turned[:-k]]) for k in range(1, order + 1)]
         by_coefficient = forced / self._below.sum() + np.stack(later)
-        for j in range(order):
-            step = np.zeros(order)
-            step[j] = _STEP
+        for j, step in enumerate(_STEP * np.eye(order)):
             up = _below(self.structure, self.theta[1:] + step)
             down = _below(self.structure, self.theta[1:] - step)
             out[1 + j] = (up - down)[1:] / (2 * _STEP) @ by_coefficient

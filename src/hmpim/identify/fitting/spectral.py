@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.fitting.start import RoughResponse
-from hmpim.identify.worth import MUCH, TWICE
+from hmpim.identify.fitting.start import RoughResponse, distinct
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 
 __all__ = ["RoughFits", "condensed", "fitted_roughly", "residual_of", "reweighted"]
@@ -93,13 +93,9 @@ def fitted_roughly(
         if np.all(still & (better | (damping > _FACTOR))):
             break
     least = float(now.errors.min())
-    likely: list[Real] = []
-    for i in np.argsort(now.errors):
-        apart = all(np.max(np.abs(now.thetas[i] - other)) > MUCH for other in likely)
-        if now.errors[i] <= TWICE * least and apart:
-            likely.append(now.thetas[i])
+    order = [i for i in np.argsort(now.errors) if now.errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)
-    return RoughFits(error=least / (power or 1.0), likely=np.array(likely))
+    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(now.thetas[order])))
 
 
 def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:

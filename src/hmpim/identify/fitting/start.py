@@ -14,6 +14,7 @@ a grid of denominators, those that explain most of the power; one inverse transf
 delay of each. For white noise this is the likelihood itself.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -28,7 +29,14 @@ from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MUCH
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "local_minima", "rough_response", "searched", "starting_values"]
+__all__ = [
+    "RoughResponse",
+    "distinct",
+    "local_minima",
+    "rough_response",
+    "searched",
+    "starting_values",
+]
 
 _STAMPED_LATE = -2
 """Least delay in samples of a start where the output follows the input."""
@@ -251,11 +259,7 @@ def starting_values(
             sections = theta_of(structure, stable / scale**powers)
             found.append((error, np.append(rough.lag + shift / finer, sections)))
     found.sort(key=lambda item: item[0])
-    starts: list[Real] = []
-    for _, theta in found:
-        if all(np.max(np.abs(theta - other)) > MUCH for other in starts):
-            starts.append(theta)
-    return starts[:count]
+    return distinct(theta for _, theta in found)[:count]
 
 
 def searched(rough: RoughResponse, structure: Structure) -> list[Real]:
@@ -276,6 +280,15 @@ def searched(rough: RoughResponse, structure: Structure) -> list[Real]:
             found.append((-float(explained[best]), np.append(delay, theta)))
     found.sort(key=lambda item: item[0])
     return [theta for _, theta in found[:3]]
+
+
+def distinct(thetas: Iterable[Real]) -> list[Real]:
+    """Parameters without those that are close to earlier ones."""
+    found: list[Real] = []
+    for theta in thetas:
+        if all(np.max(np.abs(theta - other)) > MUCH for other in found):
+            found.append(theta)
+    return found
 
 
 def _shifts(rough: RoughResponse, most: int) -> tuple[int, NDArray[np.intp]]:
