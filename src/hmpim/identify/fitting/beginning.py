@@ -133,8 +133,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     if share == 1.0 or fit.objective != fit.cost:  # a whitened fit is not the best unwhitened one
         return None
     # The free response itself may colour the residual: only its own residual is noise.
-    begun = replace(problem, valid=valid, begins=begins)
-    free = refit(begun, fit)
+    free = refit(replace(problem, valid=valid, begins=begins), fit)
     if free.objective <= 0.0:
         return begins
     statistic = free.share * count * float(np.log(power) - np.log(free.objective))

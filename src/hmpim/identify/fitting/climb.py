@@ -21,8 +21,8 @@ _NUDGE = 1e-7
 """Change of a parameter that shows whether a bound is in its way."""
 
 _NEAR = 400.0
-"""Decrement, in negligible ones, up to which one step may be the last: two standard deviations at
-the usual precision."""
+"""Decrement, over a negligible one, up to which one step may be the last: two standard deviations
+at the usual precision."""
 
 _STEEPEST = 1e6
 """Damping from which no smaller step is tried."""

@@ -50,7 +50,7 @@ __all__ = [
 ]
 
 _SOME = 100
-"""Samples that show at once that most inputs have more levels."""
+"""Samples that are enough to show, for most inputs, that they have more levels."""
 
 _LEVELS = 3
 """Levels of a switched input: two of a binary sequence, and rest before it."""

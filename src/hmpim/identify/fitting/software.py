@@ -221,19 +221,13 @@ def _software_fit(
 ) -> JointFit:
     """The same, kept: an earlier question may already have made this fit."""
     equations = _equations(u, y, valid)
-    problem = Problem(
-        source=prepare_input(u, "sampled"),
-        y=y,
-        valid=valid,
-        longest_delay=u.size // 2,
-        nuisance=nuisance,
-    )
+    source, latest = prepare_input(u, "sampled"), u.size // 2
+    problem = Problem(source=source, y=y, valid=valid, longest_delay=latest, nuisance=nuisance)
     floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
-    if (
-        first.cost > floor and equations.cost_of_all <= floor
-    ):  # exact but for input before the record
+    if first.cost > floor and equations.cost_of_all <= floor:
+        # The filters are exact but for input before the record.
         problem = _begun_at(problem, _unknown(u, equations.first + equations.count))
         fits = _followed(problem, equations, u, names, exact=floor)
     elif first.cost > floor and (begins := begins_of(problem, first, lag=0)) is not None:
@@ -283,19 +277,16 @@ def _followed(
                 poles = np.asarray(np.roots(below), dtype=np.complex128)
                 theta = np.append(theta, section_parameters(structure, poles))
             hopeless = TWICE * min((fit.cost for fit in fits), default=np.inf)
-            steps = _TASTE if fitted else 0
-            fits.append(
-                fit_structure(problem, structure, theta, iterations=steps, hopeless=hopeless)
-            )
+            most = _TASTE if fitted else 0
+            fit = fit_structure(problem, structure, theta, iterations=most, hopeless=hopeless)
+            fits.append(fit)
     if not holding:
         fits += [fit for structure in tried for fit in _walked(problem, structure, fits)]
     least = min(fit.cost for fit in fits)
-    return [
-        fit
-        if fit.cost > TWICE * least or not fit.structure.order
-        else refit(problem, fit, precision=_POLISHED)
-        for fit in fits
-    ]
+    for i, fit in enumerate(fits):
+        if fit.structure.order and fit.cost <= TWICE * least:
+            fits[i] = refit(problem, fit, precision=_POLISHED)
+    return fits
 
 
 def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:

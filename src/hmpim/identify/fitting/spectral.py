@@ -18,7 +18,7 @@ from hmpim.model.dynamics import Structure
 __all__ = ["RoughFits", "condensed", "fitted_roughly", "residual_of", "reweighted"]
 
 _ALONE = 128
-"""Bins up to this one stay single; each octave above is condensed into half as many."""
+"""Bins up to this one stay single; each octave above is condensed into half as many groups."""
 
 _STEPS = 10
 """Most steps on the rough response."""

@@ -68,7 +68,7 @@ _TURNS, _LATE = 64, 64
 by less than a turn over `_TURNS`."""
 
 _ENOUGH = 16384
-"""Least number of samples over the bins of a group."""
+"""Samples of a record with at least as many bins as remain after grouping."""
 
 _FLOOR = 1e-3
 """Bins whose input amplitude is below this share of the greatest are ignored."""
