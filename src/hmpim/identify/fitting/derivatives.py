@@ -23,10 +23,8 @@ def jacobian(
 
     Parameters
     ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Where the derivatives are taken.
+    problem, fit : Problem, Fit
+        The data, and the fit at which derivatives are taken.
     *more : ndarray, shape (n,)
         Rows of other parameters, treated alike.
     part : Part or SampledPart, optional

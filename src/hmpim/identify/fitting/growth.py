@@ -191,10 +191,8 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
 
     Parameters
     ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Any fit to them except a filter in z.
+    problem, fit : Problem, Fit
+        The data, and any fit to them except a filter in z.
     """
     row = response_to_square(problem, fit)
     residual = problem.innovations(fit.prediction, fit.residual)
@@ -271,17 +269,12 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
 
     Parameters
     ----------
-    fit : Fit
-        Without it.
-    hidden : HiddenPole
-        The result of `hidden_pole`.
+    fit, hidden : Fit, HiddenPole
+        The fit without it, and its test by `hidden_pole`.
     """
     moved = made_room(fit, hidden)
-    return replace(
-        moved,
-        structure=one_more_pole(fit.structure),
-        theta=with_pole(fit.structure, moved.theta, hidden.limit),
-    )
+    theta = with_pole(fit.structure, moved.theta, hidden.limit)
+    return replace(moved, structure=one_more_pole(fit.structure), theta=theta)
 
 
 def made_room(fit: Fit, hidden: HiddenPole) -> Fit:
@@ -292,10 +285,9 @@ def made_room(fit: Fit, hidden: HiddenPole) -> Fit:
     fit, hidden
         As for `as_if_hidden`.
     """
-    moved = hidden.limit**2 * hidden.shift
-    moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
-    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
-    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
+    change = hidden.limit**2 * hidden.shift
+    change[1 : fit.theta.size] = np.clip(change[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
+    theta, linear = _moved(fit, change)
     return replace(fit, theta=theta, linear=linear)
 
 
@@ -308,16 +300,18 @@ def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:
         As for `as_if_hidden`.
     """
     lead = float(np.sqrt(max(-hidden.squared, 0.0) + HALF * hidden.std))
-    moved = -(lead**2) * hidden.shift
-    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
-    theta[0] += lead
-    numerator = np.convolve(linear[:-1], [1.0, lead])
-    return replace(
-        fit,
-        structure=replace(fit.structure, zeros=fit.structure.zeros + 1),
-        theta=within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY),
-        linear=np.append(numerator, linear[-1]),
-    )
+    theta, linear = _moved(fit, -(lead**2) * hidden.shift, later=lead)
+    linear = np.append(np.convolve(linear[:-1], [1.0, lead]), linear[-1])
+    structure = replace(fit.structure, zeros=fit.structure.zeros + 1)
+    return replace(fit, structure=structure, theta=theta, linear=linear)
+
+
+def _moved(fit: Fit, change: Real, *, later: float = 0.0) -> tuple[Real, Real]:
+    """Theta, its time constants inside their bounds, and linear parameters of a moved fit."""
+    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + change, [fit.theta.size])
+    theta[0] += later
+    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
+    return theta, linear
 
 
 def grow(

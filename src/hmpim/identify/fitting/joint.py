@@ -194,38 +194,38 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
     the likeliest natural trials without zeros and with them, and the likeliest result leads.
     """
     growth = _grown_from(joint, joint.best, course, structures)
-    led, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
+    leading, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
     for rival in _others_to_grow(joint, course.natural):
         other = _grown_from(joint, rival, course, structures)
         found += other.grown
-        if other.grown and other.grown[-1].criterion < led.criterion:
-            growth, led = other, other.grown[-1]
+        if other.grown and other.grown[-1].criterion < leading.criterion:
+            growth, leading = other, other.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    return joint if led is joint.best else _led_by(led, joint, course, structures)
+    return joint if leading is joint.best else _with_leading(leading, joint, course, structures)
 
 
-def _led_by(
-    led: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
+def _with_leading(
+    leading: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
 ) -> JointFit:
     """The joint fit with a grown trial as the best, polished and under each assumption.
 
     The added pole may lead to new starts for plainer structures, one of which may be better still.
     """
-    natural = led.intersample
-    problem = course.data.problem(natural, course.counted)
+    mode = leading.intersample
+    problem = course.data.problem(mode, course.counted)
     count = problem.counted * joint.weighed_share
-    fits = [t.fit for t in joint.trials if t.intersample == natural]
-    plainer = [trial_of(natural, fit, count) for fit in pruned(problem, fits, structures)]
-    chosen = min([led, *plainer], key=lambda trial: trial.criterion)
+    fits = [t.fit for t in joint.trials if t.intersample == mode]
+    plainer = [trial_of(mode, fit, count) for fit in pruned(problem, fits, structures)]
+    chosen = min([leading, *plainer], key=lambda trial: trial.criterion)
     fit = polished(problem, chosen.fit)
     trials = [trial for trial in joint.trials if trial is not chosen]
-    for mode in () if course.alone else BETWEEN:
-        if mode != natural:
-            other = course.data.problem(mode, course.counted)
-            trials.append(trial_of(mode, refit_between(other, fit, natural, mode), count))
-    best = trial_of(natural, fit, count)
+    for other in () if course.alone else BETWEEN:
+        if other != mode:
+            moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
+            trials.append(trial_of(other, moved, count))
+    best = trial_of(mode, fit, count)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
-    if chosen is not led:  # it was not tested for one more pole
+    if chosen is not leading:  # it was not tested for one more pole
         return fresh
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 
@@ -262,21 +262,21 @@ def _grown_from(
             return count
         return seen_by_pole(problem, test, richer.fit) or count
 
-    def otherwise(one: Trial) -> float:
-        most = one.fit.structure.parameters
-        others = (t.fit for t in joint.trials if t.intersample != one.intersample)
+    def otherwise(given: Trial) -> float:
+        most = given.fit.structure.parameters
+        others = (t.fit for t in joint.trials if t.intersample != given.intersample)
         plain = [fit.objective for fit in others if fit.structure.parameters <= most]
         return min(plain, default=np.inf)
 
     return grow(
         trial,
-        hidden=lambda one: course.data.hidden_pole(problem, one.fit),
+        hidden=lambda tested: course.data.hidden_pole(problem, tested.fit),
         refit=lambda structure, theta: trial_of(
             trial.intersample, fit_structure(problem, structure, theta), count
         ),
         count=samples,
         names=structures,
-        white=lambda one: one.fit.is_white,
+        white=lambda found: found.fit.is_white,
         otherwise=otherwise,
     )
 

@@ -43,10 +43,8 @@ def taking(joint: JointFit, fit: Fit) -> JointFit:
 
     Parameters
     ----------
-    joint : JointFit
-        From `joint_fit`.
-    fit : Fit
-        To the same data; nothing changes if it is the chosen one.
+    joint, fit : JointFit, Fit
+        From `joint_fit`, and a fit to the same data; nothing changes if it is the chosen one.
     """
     if fit is joint.best.fit:
         return joint

@@ -23,19 +23,14 @@ def washed_out(problem: Problem, fit: Fit) -> Fit | None:
 
     Parameters
     ----------
-    problem : Problem
-        The data, without a drift.
-    fit : Fit
-        The fit with the drift.
+    problem, fit : Problem, Fit
+        The data without a drift, and the fit with it.
     """
     if fit.structure.name not in PLAIN:
         return None
     sections = one_more_pole(fit.structure).sections
-    richer = next(
-        known
-        for known in STRUCTURES.values()
-        if known.sections == sections and known.dc_zeros == known.zeros == 1
-    )
+    washouts = (known for known in STRUCTURES.values() if known.dc_zeros == known.zeros == 1)
+    richer = next(washout for washout in washouts if washout.sections == sections)
     best: Fit | None = None
     for span in _SPANS:
         slow = span * problem.y.size
@@ -43,6 +38,5 @@ def washed_out(problem: Problem, fit: Fit) -> Fit | None:
         theta[0] += slow
         hopeless = np.inf if best is None else TWICE * best.objective
         found = fit_structure(problem, richer, theta, hopeless=hopeless)
-        if best is None or found.objective < best.objective:
-            best = found
+        best = found if best is None or found.objective < best.objective else best
     return best
