@@ -6,15 +6,15 @@ start           starting values: delay and denominator from spectra
 joint           all structures, all assumptions between the samples, and the choice
 data            what all trials of a joint fit share
 candidates      fits of every structure under one assumption
-between         the same under each other, from where they ended
+between         refits under the other assumptions
 enrich          which richer structures to try, and where from
-course          the way up to the choice: start, ahead, wander, beginning, enrichment
+course          the search before the choice: start, ahead, wander, beginning, enrichment
 beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials, and whether whitening may be trusted
-trial           what was tried, and what is chosen of it
-plainer         a plain structure beside a rich one
+trial           all trials, and the choice among them
+plainer         plain structures next to a rich one
 washout         a washout in place of a drift
-nested          one pole or two: what the record cannot tell
+nested          one pole or two: error bars that admit both
 unrelated       whether an output follows its input at all
 halves          whether the halves of a record agree
 """

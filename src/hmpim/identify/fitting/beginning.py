@@ -7,9 +7,9 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Data, Seen
+from hmpim.identify.fitting.data import Data, Seen, refit
 from hmpim.identify.fitting.derivatives import products
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
@@ -32,20 +32,20 @@ __all__ = [
 ]
 
 REACH = 4
-"""Samples by which what lies between the samples reaches back: half of a spline's support."""
+"""Samples by which interpolation reaches back: half of a spline's support."""
 
 _RINGS = 8
-"""Samples about a corner over which a spline through it rings."""
+"""Samples around a corner over which a spline rings."""
 
 _FIRST = 8
-"""Samples that show whether an input is in motion from the first."""
+"""First samples, which show whether the input is in motion when the record begins."""
 
 _LEFT = 4
-"""Samples for each parameter that must be left."""
+"""Samples per parameter that a test needs at least."""
 
 
 def in_motion(u: Real) -> bool:
-    """Whether an input, (n,), moves from its first sample on, and so may have moved before."""
+    """Whether an input, (n,), moves from its first sample on, and so may have moved earlier."""
     steps = np.diff(u) ** 2
     return float(steps[:_FIRST].mean()) > PART * float(steps.mean())
 
@@ -53,9 +53,10 @@ def in_motion(u: Real) -> bool:
 def count_in(
     data: Data, mode: Intersample, fits: list[Fit], seen: Seen, known: Mask | None
 ) -> Seen:
-    """Samples that count once it is known how the system remembers, and where it begins."""
+    """Samples that count, once the memory and the delay of the system are known."""
     fit = min(fits, key=lambda f: f.objective)
-    ahead = _ahead(fits)
+    # With a negative delay the last samples depend on input after the record.
+    ahead = int(np.ceil(-fit.delay)) + 3 if fit.delay < 0 else 0
     begins = begins_of(data.problem(mode, seen), fit, lag=data.rough.lag)
     if begins is None and not ahead and known is None:
         return seen
@@ -64,19 +65,21 @@ def count_in(
     counted[: begins or 0] = False
     counted[n - ahead :] = False
     if known is not None:
-        counted = _of_measured(fit, fit.residual, counted, known)
+        counted = _of_measured(fit, counted, known)
     return Seen(valid=counted, begins=begins)
 
 
-def _of_measured(fit: Fit, residual: Real, counted: Mask, known: Mask) -> Mask:
-    """Samples that count and answer `known` input alone, where they tell more than all.
+def _of_measured(fit: Fit, counted: Mask, known: Mask) -> Mask:
+    """Samples that count and depend on `known` input alone, where these estimate better than all.
 
-    The others count as long as they hold no more than noise, or so little more that fewer samples
-    with less noise would tell less: what was filled in is part of the noise.
+    Samples that depend on filled-in input also count while their residual is not above the noise,
+    or so little above it that dropping them would cost more precision than it gains.
     """
+    residual = fit.residual
     reach = min(int(np.ceil(max(fit.delay, 0.0) + fit.memory)) + 2, residual.size // 4)
+    unknown, index = np.concatenate([[0], np.cumsum(~known)]), np.arange(known.size)
     while True:
-        clear = counted & _unaffected(known, reach)
+        clear = counted & (unknown[index + 1] == unknown[np.maximum(index - reach, 0)])
         few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
         if few or _precision(residual[clear]) <= _precision(residual[counted]):
             return counted
@@ -86,52 +89,51 @@ def _of_measured(fit: Fit, residual: Real, counted: Mask, known: Mask) -> Mask:
 
 
 def _precision(residual: Real) -> float:
-    """Samples over their mean square: an estimate's variance is inverse to it."""
+    """Samples over their mean square: the variance of an estimate is inversely proportional."""
     return residual.size**2 / max(float(np.sum(residual**2)), np.finfo(float).tiny)
 
 
 def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
-    """Sample from which on an unknown state must be fitted; None for a record at rest.
+    """Sample from which an unknown state must be fitted; None if the record begins at rest.
 
-    A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) of the free responses beside all other
-    parameters, and a chi-squared test of what comes before them, when the output still answers
-    input before the record. A fit from rest may have any delay where it was not at rest; that of
-    the cross-correlation, `lag`, is the later one, and costs a few samples.
+    A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) decides whether free responses are
+    needed in addition to all other parameters, and a chi-squared test whether the samples before
+    them answer input before the record. A fit that wrongly assumes rest may have any delay, so
+    the later of its delay and `lag`, the lag of the cross-correlation, is taken.
     """
     latest = max(fit.delay, float(lag) if lag <= problem.y.size * PART else 0.0, 0.0)
     begins = int(np.ceil(latest)) + REACH
     if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None
     late = np.arange(problem.y.size) >= begins
-    told = _counts(problem)
-    valid = told & late
+    every = _counts(problem)
+    valid = every & late
     innovations = problem.innovations(fit.prediction, fit.residual)
     count = int(np.count_nonzero(valid))
     if count < _LEFT * fit.structure.parameters:
         return None
     share = effective_share(innovations[valid])
-    if _stands_out(innovations, told & ~late, valid):
+    if _stands_out(innovations, every & ~late, valid):
         return begins
     if not fit.structure.order:
         return None
     part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
     known = part if problem.begins is None else None
-    counted = innovations if problem.counts is None else innovations * told
+    counted = innovations if problem.counts is None else innovations * every
     _, after = products(problem, fit, counted, *part.free, part=known, edges=(begins,))
     moment, power = after[:-1, -1], float(after[-1, -1])
     if power <= 0.0:
         return None
     gained = float(moment @ solved(after[:-1, :-1], moment))
-    left = max(power - gained, np.finfo(float).tiny)
+    remaining = max(power - gained, np.finfo(float).tiny)
     limit = float(scipy.special.chdtri(len(part.free), FALSE_ALARM))
-    statistic = share * count * float(np.log(power) - np.log(left))
+    statistic = share * count * float(np.log(power) - np.log(remaining))
     if statistic > limit:
         return begins
-    if share == 1.0 or fit.objective != fit.cost:  # whitened, it is not the best without a colour
+    if share == 1.0 or fit.objective != fit.cost:  # a whitened fit is not the best unwhitened one
         return None
-    # What colours the residual may be the free response itself: the noise is what it leaves.
-    begun = replace(problem, valid=valid, begins=begins)
-    free = fit_structure(begun, fit.structure, fit.theta)
+    # The free response itself may colour the residual: only its own residual is noise.
+    free = refit(replace(problem, valid=valid, begins=begins), fit)
     if free.objective <= 0.0:
         return begins
     statistic = free.share * count * float(np.log(power) - np.log(free.objective))
@@ -141,44 +143,35 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
 def look_again(
     problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool, known: Mask | None
 ) -> Seen | None:
-    """Samples that count after all, now that the structure is known; None if they are the same.
+    """Samples that count, now that the structure is known; None if they do not change.
 
-    What a band-limited input does at the ends of a record is not known: a command that starts from
-    rest has a corner there, and a spline rings about it for a few samples, a finer one for longer,
-    and for as long as it stands out of the noise.
-    Where the residual is far above the noise at samples that answer those, they do not count. If
-    what is before is still no noise, the record does not begin at rest.
+    A band-limited input is unknown at the ends of the record: a command that starts from rest has
+    a corner there, and a spline through it rings until the ringing is lost in the noise, a finer
+    spline for longer. Samples that answer the ringing do not count where the residual is far
+    above the noise. If the samples before them still hold more than noise, the record does not
+    begin at rest.
 
-    Parameters
-    ----------
-    problem : Problem
-        What the trial was fitted to.
-    trial : Trial
-        The best one.
-    seen : Seen
-        The samples that counted.
-    lag : int
-        As for `begins_of`.
-    rests : bool
-        Whether it is known from this fit that the record begins at rest.
-    known : ndarray of bool, shape (n,), or None
-        Samples at which the input was measured; None when all are.
+    `problem` is what the best `trial` was fitted to, over the samples `seen`, and `lag` is as for
+    `begins_of`. `rests` says whether this fit already showed that the record begins at rest, and
+    `known` which input samples were measured, all if None.
     """
     count = problem.y.size
-    told = _counts(problem)
+    every = _counts(problem)
     innovations = problem.innovations(trial.fit.prediction, trial.fit.residual)
-    innovations = problem.as_loud(innovations)  # divided by it, the ends would not stand out
+    innovations = problem.as_loud(
+        innovations
+    )  # after division by the level, no end would stand out
     if trial.intersample == "bandlimited":
         reach = ringing_of(problem.source)
         ringing = _ringing(count, trial.fit.delay, reach)
-        if problem.is_coloured and is_white(trial.fit.residual[told & ~ringing]):
-            innovations = trial.fit.residual  # it is the ends that have the colour
-        if _stands_out(innovations, told & ringing, told & ~ringing):
-            ringing = _until_quiet(innovations, told, ringing, trial.fit.delay, reach)
+        if problem.is_coloured and is_white(trial.fit.residual[every & ~ringing]):
+            innovations = trial.fit.residual  # only the ends are coloured
+        if _stands_out(innovations, every & ringing, every & ~ringing):
+            ringing = _until_quiet(innovations, every, ringing, trial.fit.delay, reach)
             return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
     if known is not None:
-        clear = _of_measured(trial.fit, trial.fit.residual, told, known)
-        if clear is not told:
+        clear = _of_measured(trial.fit, every, known)
+        if clear is not every:
             return replace(seen, valid=clear)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
@@ -186,46 +179,46 @@ def look_again(
         return None
     begins = begins_of(problem, trial.fit, lag=lag)
     if begins is None and problem.is_coloured:
-        # Noise of the colour of a mode explains its free response, and more of it than there is.
+        # Noise with the colour of a mode would explain more than the mode's own free response.
         begins = begins_of(problem.plain, trial.fit, lag=lag)
-    return None if begins is None else _from(seen, begins, count)
+    return None if begins is None else begin_at(seen, begins, count)
 
 
-def _until_quiet(innovations: Real, told: Mask, first: Mask, delay: float, reach: int) -> Mask:
-    """Samples over which the ends ring, as far as they stand out of the noise.
+def _until_quiet(innovations: Real, every: Mask, first: Mask, delay: float, reach: int) -> Mask:
+    """Samples over which the ends ring above the noise.
 
-    What has not died away over a twentieth of the record is none of the ends' doing: it is left
-    in, but for the first of them.
+    Ringing dies away within a twentieth of the record; anything longer has another cause, and
+    only the `first` samples are then returned.
     """
     ringing, count = first, innovations.size
     while reach < FEW * count:
         reach *= 2
         wider = _ringing(count, delay, reach)
-        if not _stands_out(innovations, told & wider & ~ringing, told & ~wider):
+        if not _stands_out(innovations, every & wider & ~ringing, every & ~wider):
             return ringing
         ringing = wider
     return first
 
 
 def ringing_of(source: SampledInput) -> int:
-    """Samples about a corner over which a spline rings: a finer one for longer.
+    """Samples around a corner over which a spline rings: a finer one rings for longer.
 
-    Of a record too short to do without them only the first are asked for.
+    A short record cannot spare that many, so only the first few are counted.
     """
     finer = source.oversampling > 1 and FEW * source.samples > MARGIN
     return MARGIN if finer else _RINGS
 
 
 def _ringing(count: int, delay: float, reach: int) -> Mask:
-    """Samples that answer those within reach of either end of the record."""
+    """Samples that answer input within `reach` of either end of the record."""
     late = np.arange(count) - delay
     return np.asarray((np.abs(late) <= reach) | (late >= count - 1 - reach))
 
 
 def begin_later(seen: Seen, fit: Fit) -> Seen | None:
-    """Samples that count where a fit has a longer delay than those before; None if none goes.
+    """Samples that count if a fit has a longer delay than earlier ones; None if none drops out.
 
-    What comes before the delay answers input before the record, which no free response describes.
+    Samples before the delay answer input before the record, which no free response describes.
     """
     begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
     if seen.begins is None or begins <= seen.begins:
@@ -234,12 +227,9 @@ def begin_later(seen: Seen, fit: Fit) -> Seen | None:
 
 
 def begin_at(seen: Seen, begins: int, size: int) -> Seen | None:
-    """Samples that counted, from one on; None where no delay is as long."""
-    return None if begins > longest_lag(size) else _from(seen, begins, size)
-
-
-def _from(seen: Seen, begins: int, size: int) -> Seen:
-    """The samples that counted, from one on."""
+    """Samples that counted, from `begins` on; None if that is longer than any delay."""
+    if begins > longest_lag(size):
+        return None
     late = np.arange(size) >= begins
     return Seen(valid=late if seen.valid is None else seen.valid & late, begins=begins)
 
@@ -250,48 +240,35 @@ def _counts(problem: Problem) -> Mask:
 
 
 def _stands_out(innovations: Real, some: Mask, others: Mask) -> bool:
-    """Whether some samples hold more than the noise that the others show."""
-    told = some | others
-    return bool(stand_out_of(innovations[told][None], some[told][None])[0])
+    """Whether some samples have more power than the noise in the others explains."""
+    every = some | others
+    return bool(stand_out_of(innovations[every][None], some[every][None])[0])
 
 
 def stand_out_of(innovations: Real, some: Mask) -> Mask:
-    """Which residuals hold more in some samples than the noise that their others show.
+    """Which residuals have more power in some samples than the noise in the others explains.
 
     Parameters
     ----------
     innovations : ndarray, shape (k, n)
         Residuals, whitened.
     some : ndarray of bool, shape (k, n)
-        The samples that are asked for; the others tell the noise.
+        The samples to test; the noise is estimated from the others.
     """
     squares = innovations**2
     counts = np.count_nonzero(some, axis=1)
-    told = (counts > 0) & (counts < some.shape[1])
+    testable = (counts > 0) & (counts < some.shape[1])
     level, every = np.zeros(some.shape[0]), every_of(some.shape[1])
-    bulk, out_of_it = squares[:, ::every], some[:, ::every]
-    left_out = np.count_nonzero(out_of_it, axis=1)
-    for count in np.unique(left_out[told]):  # rows with equally many others share one array
-        alike = told & (left_out == count)
-        others = bulk[alike][~out_of_it[alike]].reshape(-1, bulk.shape[1] - count)
+    bulk, tested = squares[:, ::every], some[:, ::every]
+    omitted = np.count_nonzero(tested, axis=1)
+    for count in np.unique(omitted[testable]):  # rows with equally many others share one array
+        alike = testable & (omitted == count)
+        others = bulk[alike][~tested[alike]].reshape(-1, bulk.shape[1] - count)
         level[alike] = np.median(others, axis=1) / 0.455  # of a squared Gaussian
     limit = level * scipy.special.chdtri(np.maximum(counts, 1), FALSE_ALARM)
-    held = np.vecdot(squares, some)
-    out = np.asarray(told & (held > limit))
-    # Twice as much where the others are not white: they hold more than noise.
+    power = np.vecdot(squares, some)
+    out = np.asarray(testable & (power > limit))
+    # Twice the limit where the others are not white, and so hold more than noise.
     white = are_white(np.where(some[out], 0.0, innovations[out]))
-    out[out] = white | (held > TWICE * limit)[out]
+    out[out] = white | (power > TWICE * limit)[out]
     return out
-
-
-def _ahead(fits: list[Fit]) -> int:
-    """Samples at the end that depend on input after the record, if the delay is negative."""
-    delay = min(fits, key=lambda f: f.objective).delay
-    return int(np.ceil(-delay)) + 3 if delay < 0 else 0
-
-
-def _unaffected(known: Mask, memory: int) -> Mask:
-    """Samples whose output depends on measured input alone."""
-    unknown = np.concatenate([[0], np.cumsum(~known)])
-    index = np.arange(known.size)
-    return np.asarray(unknown[index + 1] == unknown[np.maximum(index - memory, 0)])

@@ -1,4 +1,4 @@
-"""Fits under each assumption between the samples, from where they ended under another."""
+"""Refits under each assumption between the samples, from where fits under another ended."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.candidates import best_of
-from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Seen, shifted
+from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Fits, Seen, shifted
 from hmpim.identify.fitting.enrich import PLAIN, RICH, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.worth import TWICE
@@ -25,7 +25,7 @@ def refit_between(
     iterations: int = RETURNS,
     hopeless: float = np.inf,
 ) -> Fit:
-    """Fit the same structure under another assumption, from where the first one ended."""
+    """Fit the same structure under another assumption, from where the first fit ended."""
     theta = shifted(fit.theta, origin, mode)
     return fit_structure(problem, fit.structure, theta, iterations=iterations, hopeless=hopeless)
 
@@ -38,12 +38,12 @@ def fit_under_each_assumption(
     structures: tuple[StructureName, ...],
     *,
     alone: bool,
-) -> list[tuple[Intersample, Fit]]:
-    """Add to fits under the natural assumption those under the others, unless it stands alone.
+) -> Fits:
+    """Add fits under the other assumptions, unless the natural one is `alone`.
 
-    Poles and zeros of a rich one may have made up for a wrong assumption: plainer ones are fitted
-    under the others as far as they may be about as likely, also those of `structures` that have the
-    poles of one that was fitted, and other zeros.
+    Poles and zeros of a rich structure may have made up for a wrong assumption. So plainer
+    structures are fitted under the other assumptions if they may be about as likely, and so are
+    members of `structures` with the poles of a fitted one and other zeros.
     """
     fitted = [(natural, fit) for fit in fits]
     if alone:
@@ -62,7 +62,7 @@ def fit_under_each_assumption(
             behind.append(fit)
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
-    def moved(some: list[Fit]) -> list[tuple[Intersample, Fit]]:
+    def moved(some: list[Fit]) -> Fits:
         return [
             (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
             for mode, problem in problems.items()
@@ -71,7 +71,7 @@ def fit_under_each_assumption(
 
     fitted += moved(leading)
     if min(fit.objective for _, fit in fitted) < least - clearly:
-        fitted += moved(trailing)  # behind under a wrong assumption, perhaps not under this
+        fitted += moved(trailing)  # these may trail only because the assumption was wrong
     else:
         behind += trailing
     if best.structure.name in PLAIN:
@@ -82,10 +82,10 @@ def fit_under_each_assumption(
             continue
         most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
         for mode, problem in problems.items():
-            one = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=most)
-            if not one.converged and one.objective < TWICE**2 * least:
-                one = refit_between(problem, one, mode, mode, hopeless=most)
-            fitted.append((mode, one))
+            other = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=most)
+            if not other.converged and other.objective < TWICE**2 * least:
+                other = refit_between(problem, other, mode, mode, hopeless=most)
+            fitted.append((mode, other))
     for start in _with_other_zeros(fits, structures):
         if start.structure.parameters < best.structure.parameters:
             for mode, problem in problems.items():
@@ -95,7 +95,7 @@ def fit_under_each_assumption(
 
 
 def _with_other_zeros(fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
-    """Starts of structures that were not fitted, at the poles of the best that has as many."""
+    """Starts for structures that were not fitted, at the poles of the best fit with as many."""
     tried = {fit.structure for fit in fits}
     starts = []
     for structure in members(structures, RICH):

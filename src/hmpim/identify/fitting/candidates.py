@@ -1,22 +1,23 @@
-"""Fits of every structure under one assumption: plain ones, and richer ones where asked for."""
+"""Fits of every structure under one assumption: plain ones, and richer ones if needed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.fitting.beginning import in_motion
-from hmpim.identify.fitting.data import TASTE, Data, hopeless_beside
+from hmpim.identify.fitting.data import TASTE, Data, hopeless_beside, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
     RICH,
     Proposal,
-    about,
     integrator_starts,
     members,
     proposals,
+    with_fit,
     without_fast,
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -50,16 +51,16 @@ _LONG_TASTE = 12
 """Steps from each start of a richer structure, whose valleys are longer."""
 
 _PARTNER = 0.3
-"""Time constant of a pole that is added, over the fit's own."""
+"""Time constant of an added pole, over the fit's own."""
 
 _AT_ONCE = 4
-"""Richer structures tried before it is asked whether more are needed."""
+"""Richer structures tried before a check whether more are needed."""
 
 _SLIPS = 4
-"""Half periods by which the delay of a fit in mid-motion is moved either way, to start again."""
+"""Half periods by which the delay of a fit in mid-motion is moved either way for new starts."""
 
 _PRECISION = 1e-2
-"""Precision of a fit that is weighed against others, see `fit_structure`."""
+"""Precision of a fit that is compared with others, see `fit_structure`."""
 
 
 def fit_plain(
@@ -71,9 +72,9 @@ def fit_plain(
 ) -> list[Fit]:
     """Fit each structure, the richest first, from its own starts and then from the simpler ones.
 
-    The first start of a structure is where it ended `before`, on other samples, if it was fitted.
-    A residual that is white needs no other start, and tells which simpler structures are
-    hopeless: those get one start, and no step that does not lead near.
+    The first start of a structure is where its fit ended `before`, on other samples, if any.
+    Once a residual is white no other start is needed, and simpler structures that promise much
+    more than its sum of squares are hopeless: they get one start, and only promising steps.
     """
     fits: list[Fit] = []
     settled = False
@@ -87,7 +88,7 @@ def fit_plain(
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
         hopeless = TWICE * hopeful if settled else np.inf
         fit = fit_structure(problem, structure, starts[0], iterations=TASTE, hopeless=hopeless)
-        # A residual of noise for the most part is white whatever the model misses.
+        # Where noise is most of the output, the residual is white whatever the model misses.
         noisy = fit.cost > MOST * problem.spread
         white = fit.objective < hopeful and fit.is_white
         if noisy:
@@ -95,39 +96,39 @@ def fit_plain(
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
-                # A climb on the rough response would follow the free response.
+                # A climb on the rough response would fit the free response.
                 more = starting_values(rough, structure)
                 rivals += [t for t in more if not any(np.array_equal(t, s) for s in starts)]
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
             fit = _tasted(problem, rivals, fit)
-            # Of an output that is ahead, the record does not hold the beginning either.
+            # Where the output is ahead, the record lacks the beginning as well.
             underway = problem.begins is not None or fit.delay < STAMPED_LATE
             if not settled and structure.order and underway and not fit.is_white:
                 fit = _tasted(problem, _slipped(rough, fit.theta), fit)
         settled = settled or white
         fits.append(fit)
-    for i, fit in enumerate(fits):
-        for other in fits:
-            if _nests(other, fit):
-                rival = fit_structure(problem, fit.structure, nested(other), iterations=TASTE)
-                fits[i] = min(fits[i], rival, key=lambda f: f.objective)
+    at = {fit.structure.name: i for i, fit in enumerate(fits)}
+    if "first_order" in at and "second_order" in at:
+        simple, rich = fits[at["first_order"]], fits[at["second_order"]]
+        if simple.objective <= rich.objective or not rich.is_white:  # it may have missed its best
+            rival = fit_structure(problem, rich.structure, nested(simple), iterations=TASTE)
+            fits[at["second_order"]] = min(rich, rival, key=lambda f: f.objective)
     least = min(fit.objective for fit in fits)
 
     def ended(fit: Fit) -> Fit:
-        if fit.objective > TWICE**2 * least:  # a start at most
-            return fit.bare
-        if fit.converged:
+        if fit.objective <= TWICE**2 * least:
+            return fit if fit.converged else refit(problem, fit, precision=_PRECISION / fit.share)
+        if not fit.prediction.size:
             return fit
-        precision = _PRECISION / fit.share
-        return fit_structure(problem, fit.structure, fit.theta, precision=precision)
+        return replace(fit, prediction=np.empty(0), residual=np.empty(0))  # at most a start
 
     return [ended(fit) for fit in fits]
 
 
 def _tasted(problem: Problem, starts: Sequence[Real], best: Fit) -> Fit:
-    """The best of a fit and of a few steps from each other start that leads near it."""
+    """The best of a fit and of a few steps from each other promising start."""
     for theta in starts:
         hopeless = TWICE * best.objective
         rival = fit_structure(problem, best.structure, theta, iterations=TASTE, hopeless=hopeless)
@@ -136,10 +137,10 @@ def _tasted(problem: Problem, starts: Sequence[Real], best: Fit) -> Fit:
 
 
 def _slipped(rough: RoughResponse, theta: Real) -> list[Real]:
-    """Starts whose delay is some half periods of the input's mean frequency earlier or later.
+    """Starts whose delay is a few half periods of the input's mean frequency earlier or later.
 
-    Beyond a resonance the phase hardly turns: a delay that is a period off leaves a valley of its
-    own, and the free response hides which of them is the deepest.
+    Beyond a resonance the phase hardly turns: each delay that is a period off has a local minimum
+    of its own, and the free response hides which of them is the lowest.
     """
     mean = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     steps = np.pi / mean * np.array([k for k in range(-_SLIPS, _SLIPS + 1) if k])
@@ -155,23 +156,23 @@ def fit_rich(
     all_of_them: bool,
     shared: bool,
 ) -> list[Fit]:
-    """Fits of the richer structures, the most promising first, until nothing is left to explain.
+    """Fits of the richer structures, the most promising first, until the residual is explained.
 
-    And those that are a richer one without what the record does not need of it. Where the output is
-    `shared` with inputs whose fits are unfinished, many poles need not leave white noise, but at
-    most half the power that few leave.
+    Simpler versions of these, without parameters that the record does not need, are added. Fits
+    with many poles must leave white noise; if inputs with unfinished fits move the output too
+    (`shared`), at most half the residual power of fits with few poles is enough.
     """
     found = _climbed(data, problem, fits, structures, all_of_them=all_of_them, shared=shared)
     found += pruned(problem, [*fits, *found], structures)
     if found and not min(found, key=lambda fit: fit.objective).is_white:
-        # Poles without end, or as slow as the record, follow what no linear model describes:
-        # friction, rounding.
+        # More and more poles, or ones as slow as the record, fit nonlinear effects: friction,
+        # rounding.
         few = [f for f in found if f.structure.order <= FEW_POLES]
         enough = min((f.objective for f in [*fits, *few]), default=np.inf) / TWICE
         many = [f for f in found if shared and f not in few and f.objective < enough]
         found = [f for f in [*few, *many] if not spans_record(f)]
         if min(fits, key=lambda fit: fit.objective).is_white:
-            # In a loop, noise returns through the input and looks like dynamics.
+            # In closed loop, noise returns through the input and looks like dynamics.
             found = [f for f in found if f.is_white]
     return found
 
@@ -185,16 +186,16 @@ def _climbed(
     all_of_them: bool,
     shared: bool,
 ) -> list[Fit]:
-    """Fits of richer structures from the rough response, until nothing is left to explain.
+    """Fits of richer structures from the rough response, until the residual is explained.
 
-    And, where that is not shared with other inputs, from what the best of them leaves over.
+    Unless the output is shared with other inputs, starts also come from the best fit's residual.
     """
     found = fit_integrating(data, problem, fits, structures)
     if sums_to_noise([*fits, *found]):
         return found
     best = min([*fits, *found], key=lambda fit: fit.objective)
     rich = members(structures, RICH)
-    # A rough response that takes a free response for an answer proposes nothing that is of use.
+    # A rough response that mistakes a free response for an answer proposes nothing useful.
     misled = data.keeps_samples and in_motion(data.u) and is_poor(best, problem.spread)
     proposed = proposals(data.rough, rich, best, all_of_them=all_of_them or misled)
 
@@ -207,27 +208,30 @@ def _climbed(
     def explains(fit: Fit) -> bool:
         return owed_to_input(problem, fit, data) <= MATERIAL and fit.is_white
 
-    for some in _batches(proposed):
-        for p in some:
+    near = [p for p in proposed if p.promising and p.error < PART**2]
+    far = [p for p in proposed if p not in near]
+    some, rest = ([g[i : i + _AT_ONCE] for i in range(0, len(g), _AT_ONCE)] for g in (near, far))
+    for batch in [*some, [], *rest]:
+        for p in batch:
             found.append(climbed(p))
-        if not some:
+        if not batch:  # modes in parallel after the proposals near the rough response
             late = min(proposed, key=lambda p: p.error).starts[0][0] if proposed else best.delay
             modes = members(structures, ("two_modes", *MODES))
             hopeless = PART * best.objective
             grown = grown_modes(problem, data, float(late), best.memory, modes, hopeless=hopeless)
-            # Two modes that explain part of what follows the input stand for what is not linear.
+            # Modes that explain only part of the residual fit a nonlinear effect.
             found += [f for f in grown if f.cost < PART * best.cost]
         best = min([best, *found], key=lambda fit: fit.objective)
         if explains(best):
             return found
     if shared or best.structure.integrators:
         return found
-    for p in proposals(about(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
+    for p in proposals(with_fit(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
         fit = climbed(p)
-        same = [one for one in found if one.structure == p.structure]
-        if any(one.objective <= fit.objective for one in same):
+        same = [f for f in found if f.structure == p.structure]
+        if any(f.objective <= fit.objective for f in same):
             continue
-        found = [*(one for one in found if one not in same), fit]
+        found = [*(f for f in found if f not in same), fit]
         if explains(fit):
             break
     return found
@@ -238,20 +242,19 @@ def fit_integrating(
 ) -> list[Fit]:
     """Fits of the structures that integrate, the plainest first, until one leaves white noise.
 
-    Or explains next to nothing, of an output that does not wander. Those among `fits` are not
-    fitted again.
+    The search also stops at one that explains next to nothing, as of an output that does not
+    wander. Structures among `fits` are not fitted again.
     """
     found: list[Fit] = []
     for structure in members(structures, INTEGRATING):
-        if sums_to_noise([*fits, *found]):
-            break
-        if found and found[-1].objective > NEARLY * problem.spread:
+        useless = bool(found) and found[-1].objective > NEARLY * problem.spread
+        if useless or sums_to_noise([*fits, *found]):
             break
         if any(fit.structure == structure for fit in fits):
             continue
         if not found:
-            added = np.cumsum(data.u - data.u[0])
-            rough = rough_response(added, data.y, longest_delay=longest_lag(data.y.size))
+            running_sum = np.cumsum(data.u - data.u[0])
+            rough = rough_response(running_sum, data.y, longest_delay=longest_lag(data.y.size))
         rivals = [*fits, *found]
         starts = [*_grown(structure, rivals), *integrator_starts(rough, structure)]
         found.append(best_of(problem, structure, starts, rivals))
@@ -259,40 +262,25 @@ def fit_integrating(
 
 
 def sums_to_noise(fits: list[Fit]) -> bool:
-    """Whether the best fit with an integrator leaves white noise, and no more than others do.
+    """Whether the best fit with an integrator leaves white noise, and little more than others do.
 
-    Of a white output, one that explains nothing leaves white noise too.
+    If the output is white, a fit that explains nothing leaves white noise too.
     """
     integrating = [fit for fit in fits if fit.structure.integrators]
-    if not integrating:
-        return False
-    best = min(integrating, key=lambda fit: fit.objective)
-    return best.objective < TWICE * min(fit.objective for fit in fits) and best.is_white
-
-
-def _batches(proposed: list[Proposal]) -> Iterator[list[Proposal]]:
-    """Proposals a few at a time: those near the rough response, none for modes, then the rest.
-
-    An empty batch stands for modes in parallel.
-    """
-    near = [p for p in proposed if p.promising and p.error < PART**2]
-    far = [p for p in proposed if p not in near]
-    for start in range(0, len(near), _AT_ONCE):
-        yield near[start : start + _AT_ONCE]
-    yield []
-    for start in range(0, len(far), _AT_ONCE):
-        yield far[start : start + _AT_ONCE]
+    best = min(integrating, key=lambda fit: fit.objective, default=None)
+    least = min(fit.objective for fit in fits)
+    return best is not None and best.objective < TWICE * least and best.is_white
 
 
 def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
-    """Plainer rich structures from the slowest poles of those near the lead, the richest first.
+    """Plainer rich structures from the slowest poles of the leading fits, the richest first.
 
-    A pole or a zero that the record does not need lies anywhere; without it the rest begins close
-    to its best, where a rough response may have proposed nothing of use.
+    A pole or zero that the record does not need may lie anywhere. Without it the others start
+    close to their best values, where the rough response may have proposed nothing useful.
     """
     found: list[Fit] = []
     rich = members(structures, (*RICH, *INTEGRATING))
-    for structure in sorted(rich, key=lambda one: -one.parameters):
+    for structure in sorted(rich, key=lambda s: -s.parameters):
         every = [*fits, *found]
         least = min(fit.objective for fit in every)
 
@@ -311,27 +299,26 @@ def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, .
         taste = fit_structure(problem, structure, start, iterations=TASTE, hopeless=hopeless)
         if taste.objective < hopeless:
             fit = best_of(problem, structure, [taste.theta], near)
-            if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else it is in another valley
+            if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else in another local minimum
                 found.append(fit)
     return found
 
 
 def _holds(fit: Fit, plain: Structure) -> bool:
-    """Whether a fit has at least a structure's poles and zeros, and more of either.
+    """Whether a fit has all poles and zeros of a plainer structure, and more of either.
 
-    A pole as slow as the record is long holds an integrator.
+    A pole as slow as the record is long counts as an integrator.
     """
     rich = fit.structure
     few = plain.zeros <= rich.zeros and plain.dc_zeros >= rich.dc_zeros
     few = few and plain.order + plain.integrators <= rich.order + rich.integrators
     alike = plain.integrators == rich.integrators
-    if plain.integrators > rich.integrators:
-        alike = almost_integrates(fit)
+    alike = alike or (plain.integrators > rich.integrators and almost_integrates(fit))
     return few and alike and plain.parameters < rich.parameters
 
 
 def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
-    """Starts from fits that have one pole less."""
+    """Starts from fits with one pole fewer."""
     return [
         with_pole(fit.structure, fit.theta, _PARTNER * scale_of(fit))
         for fit in fits
@@ -347,28 +334,26 @@ def best_of(
     *,
     far_off: bool = False,
 ) -> Fit:
-    """The best of several starts, followed to its end if it may lead.
+    """The best of several starts, fitted to convergence if it may lead.
 
-    Unless they are `far_off`, one whose steps promise no chance against its rivals is left. Of what
-    is left over in colour few samples are independent: a step that gains less than one of those
-    could tell is not worth making.
+    Unless the rivals are `far_off`, a start whose steps promise no chance against them is given
+    up. In a coloured residual few samples are independent, so the precision is in units of those.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     tried: list[Fit] = []
     for theta in starts:
-        tried.append(
-            fit_structure(
-                problem,
-                structure,
-                theta,
-                iterations=_LONG_TASTE,
-                precision=precision,
-                hopeless=hopeless,
-            )
+        fit = fit_structure(
+            problem,
+            structure,
+            theta,
+            iterations=_LONG_TASTE,
+            precision=precision,
+            hopeless=hopeless,
         )
-        if tried[-1].converged and tried[-1].is_white:
+        tried.append(fit)
+        if fit.converged and fit.is_white:
             break
     best = min(tried, key=lambda fit: fit.objective)
     if steps_through(structure, held=problem.source.degree == 0):
@@ -380,11 +365,11 @@ def best_of(
     for fit in rivals:  # by Schwarz's criterion
         paid = np.exp(price * (fit.structure.parameters - structure.parameters))
         hopeless = min(hopeless, float(paid) * fit.objective)
-    return fit_structure(problem, structure, best.theta, precision=precision, hopeless=hopeless)
+    return refit(problem, best, precision=precision, hopeless=hopeless)
 
 
 def _best_sample(problem: Problem, best: Fit) -> Fit:
-    """The best of a fit and those one sample earlier or later, until none is better."""
+    """Move the delay one sample earlier or later while that improves the fit."""
     for step in (-1.0, 1.0):
         while True:
             start = np.append(best.theta[0] + step, best.theta[1:])
@@ -399,24 +384,24 @@ def _best_sample(problem: Problem, best: Fit) -> Fit:
 def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
     """Share of the output (r.m.s.) by which the residual follows the input; 0 if by chance.
 
-    Infinite where a part of the response is missed, or much of the output is left over.
+    Infinite where part of the response is missed, or much of the output is unexplained.
     """
-    left, spread = data.misfit(fit), problem.spread
+    misfit, spread = data.misfit(fit), problem.spread
     owed = 0.0
-    if left.probability < FALSE_ALARM:
-        owed = float(np.sqrt(left.share * fit.cost / spread)) if spread else 0.0
+    if misfit.probability < FALSE_ALARM:
+        owed = float(np.sqrt(misfit.share * fit.cost / spread)) if spread else 0.0
         if owed <= MATERIAL and data.keeps_samples and _misses_part(problem, fit, data):
             owed = np.inf
     return np.inf if owed <= MATERIAL and is_poor(fit, spread) else owed
 
 
 def is_poor(fit: Fit, spread: float) -> bool:
-    """Whether much of the output is left over, and it is no white noise."""
+    """Whether much of the output is unexplained, and the residual is not white."""
     return fit.cost > PART * spread and not fit.is_white
 
 
 def spans_record(fit: Fit) -> bool:
-    """Whether a pole that is no integrator is about as slow as the record is long."""
+    """Whether a pole other than an integrator is about as slow as the record is long."""
     return almost_integrates(fit) and not fit.structure.integrators
 
 
@@ -432,28 +417,19 @@ def _misses_part(problem: Problem, fit: Fit, data: Data) -> bool:
         counted = np.flatnonzero(problem.valid)
         span = slice(int(counted[0]), int(counted[-1]) + 1)
         if counted.size < counted[-1] + 1 - counted[0]:
-            return False  # spectra do not bear gaps
+            return False  # a spectrum needs samples without gaps
     missed = unexplained_response(
         data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=data.band
     )
     return missed > FEW
 
 
-def _nests(simple: Fit, rich: Fit) -> bool:
-    """Whether the simpler structure is a start for a richer one that may have missed its best."""
-    return (
-        simple.structure.name == "first_order"
-        and rich.structure.name == "second_order"
-        and (simple.objective <= rich.objective or not rich.is_white)
-    )
-
-
 def _without_second_pole(second_order: Fit) -> Real:
-    """First order from second: a fast second pole counts as delay."""
+    """First-order start from a second-order fit: a fast second pole counts as delay."""
     delay, log_lag, shape = second_order.theta
     return np.array([delay + min(shape, 0.25) * np.exp(log_lag), log_lag])
 
 
 def nested(first_order: Fit) -> Real:
-    """First order as second: a quarter of its time constant moved into a second pole."""
+    """Second-order start from a first-order fit: a quarter of its time constant becomes a pole."""
     return np.concatenate([first_order.theta, [0.1875]])  # (1 + 3/4 Ts)(1 + 1/4 Ts)

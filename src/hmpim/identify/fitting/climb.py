@@ -1,7 +1,6 @@
-"""Levenberg and Marquardt's way down, for anything that is linear but for a few parameters."""
+"""The Levenberg-Marquardt algorithm, for models that are linear in most parameters."""
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -22,30 +21,30 @@ _NUDGE = 1e-7
 """Change of a parameter that shows whether a bound is in its way."""
 
 _NEAR = 400.0
-"""Decrement, over what is negligible, up to which one step may be the last: two standard deviations
+"""Decrement, over a negligible one, up to which one step may be the last: two standard deviations
 at the usual precision."""
 
 _STEEPEST = 1e6
-"""The same, from which on no smaller step is tried."""
+"""Damping from which no smaller step is tried."""
 
 _POORLY, _WELL = 0.25, 0.75
-"""Share of the gain hoped for below which the damping grows, and above which it falls."""
+"""Share of the predicted gain below which the damping grows, and above which it falls."""
 
 
 class Evaluated(Protocol):
-    """A model at given parameters: what all that is linear leaves over, and the way down."""
+    """A model at given nonlinear parameters, its linear ones solved for."""
 
     @property
     def thetas(self) -> list[Real]:
-        """Parameters that are not linear, of each input."""
+        """Nonlinear parameters of each input."""
 
     @property
     def linear(self) -> Real:
-        """Parameters that are."""
+        """Linear parameters."""
 
     @property
     def cost(self) -> float:
-        """Sum of squares of what is left over."""
+        """Sum of squares of the residual."""
 
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of the nonlinear parameters: matrix, and derivative of the cost."""
@@ -65,10 +64,11 @@ def climb(
     precision: float,
     hopeless: float = np.inf,
 ) -> tuple[E, bool]:
-    """Levenberg and Marquardt's way to the least cost.
+    """Minimise the cost by the Levenberg-Marquardt algorithm.
 
-    The damping follows how well the quadratic model foretells each step (J. Nocedal and S. J.
-    Wright, Numerical Optimization, 2nd ed., 2006, section 4.1); parameters at a bound are held.
+    The damping follows how well the quadratic model predicts each step (J. Nocedal and S. J.
+    Wright, Numerical Optimization, 2nd ed., 2006, section 4.1). Parameters at a bound are held.
+    Where two real poles meet, the search continues with the poles grouped anew.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def climb(
     structures : sequence of Structure
         One for each input.
     bounded : callable
-        Keeps parameters where they can be told.
+        Keeps parameters where they are identifiable.
     counted : int
         Samples that count.
     iterations, precision, hopeless
@@ -92,16 +92,47 @@ def climb(
     bool
         Whether the last step was negligible.
     """
-    descended = partial(
-        _descended,
-        evaluated=evaluated,
-        structures=structures,
-        bounded=bounded,
-        counted=counted,
-        iterations=iterations,
-        precision=precision,
-        hopeless=hopeless,
-    )
+
+    def descended(best: E) -> tuple[E, bool]:
+        edges = np.cumsum([theta.size for theta in best.thetas])[:-1]
+        damping = _DAMPING
+        for _ in range(iterations):
+            here = np.concatenate(best.thetas)
+            free, normal, moment, decrement = _free_directions(best, edges, bounded)
+            negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
+            if decrement < negligible:
+                return best, True
+            if best.cost - decrement > max(hopeless, best.cost / TWICE**2):
+                return best, False
+            refused = 0
+            while True:
+                step = np.zeros(here.size)
+                step[free] = solved(normal, moment, damping)
+                steps = np.split(step, edges)
+                share = min(
+                    _limited(s, t, d)
+                    for s, t, d in zip(structures, best.thetas, steps, strict=True)
+                )
+                moved = bounded(np.split(here + share * step, edges))
+                trial = evaluated(moved)
+                taken = (np.concatenate(moved) - here)[free]
+                predicted = float(taken @ (2.0 * moment - normal @ taken))
+                if trial.cost < best.cost:
+                    break
+                if damping > _STEEPEST or abs(predicted) < negligible:
+                    return best, True  # no descent: a kink, or the limit of the arithmetic
+                damping *= 10.0
+                refused += 1
+            fell, best = best.cost - trial.cost, trial
+            near = decrement < _NEAR * negligible and _remaining(decrement, fell) < negligible
+            if near or (fell < negligible and damping <= 10 * _DAMPING):
+                return best, True
+            if fell < _POORLY * predicted:
+                damping *= 2.0
+            elif fell > _WELL * predicted and not refused:
+                damping = max(damping / 10.0, 1e-9)
+        return best, False
+
     best, converged = descended(evaluated(thetas))
     other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
     if all(theta is None for theta in other):
@@ -113,65 +144,14 @@ def climb(
     return (again, ended) if again.cost <= best.cost else (best, converged)
 
 
-def _descended(
-    best: E,
-    *,
-    evaluated: Callable[[Sequence[Real]], E],
-    structures: Sequence[Structure],
-    bounded: Callable[[Sequence[Real]], list[Real]],
-    counted: int,
-    iterations: int,
-    precision: float,
-    hopeless: float = np.inf,
-) -> tuple[E, bool]:
-    """Where the way down from one grouping of the poles ends, and whether it does."""
-    edges = np.cumsum([theta.size for theta in best.thetas])[:-1]
-    damping = _DAMPING
-    for _ in range(iterations):
-        here = np.concatenate(best.thetas)
-        free, normal, moment, decrement = _free_directions(best, edges, bounded)
-        negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
-        if decrement < negligible:
-            return best, True
-        if best.cost - decrement > max(hopeless, best.cost / TWICE**2):
-            return best, False
-        refused = 0
-        while True:
-            step = np.zeros(here.size)
-            step[free] = solved(normal, moment, damping)
-            steps = np.split(step, edges)
-            share = min(
-                _limited(s, t, d) for s, t, d in zip(structures, best.thetas, steps, strict=True)
-            )
-            moved = bounded(np.split(here + share * step, edges))
-            trial = evaluated(moved)
-            taken = (np.concatenate(moved) - here)[free]
-            hoped = float(taken @ (2.0 * moment - normal @ taken))
-            if trial.cost < best.cost:
-                break
-            if damping > _STEEPEST or abs(hoped) < negligible:
-                return best, True  # no way down: a kink, or the arithmetic's own floor
-            damping *= 10.0
-            refused += 1
-        fell, best = best.cost - trial.cost, trial
-        near = decrement < _NEAR * negligible and _left(decrement, fell) < negligible
-        if near or (fell < negligible and damping <= 10 * _DAMPING):
-            return best, True
-        if fell < _POORLY * hoped:
-            damping *= 2.0
-        elif fell > _WELL * hoped and not refused:
-            damping = max(damping / 10.0, 1e-9)
-    return best, False
-
-
 def _free_directions(
     best: Evaluated, edges: NDArray[np.intp], bounded: Callable[[Sequence[Real]], list[Real]]
 ) -> tuple[Mask, Real, Real, float]:
     """Parameters that no bound holds, their normal equations, and Newton's decrement.
 
-    The decrement is what a full step would still gain. A parameter is held where the way down
-    leads it out of its bounds (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982); the others then
-    move as if it were known.
+    The decrement is what a full step would still gain. A parameter is held where descent leads
+    it out of its bounds (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982); the others then move
+    as if it were known.
     """
     normal, moment = best.normal()
     here = np.concatenate(best.thetas)
@@ -183,17 +163,17 @@ def _free_directions(
     return free, normal, moment, float(toward @ moment)
 
 
-def _left(decrement: float, fell: float) -> float:
-    """What is left to gain after a step that should have gained its decrement, and so much it did.
+def _remaining(decrement: float, fell: float) -> float:
+    """Gain that remains after a step that should have gained its decrement but gained `fell`.
 
-    Where the curvature is off by a share ρ, the step gains ρ of the decrement less and leaves ρ²
-    of it; where it is the third derivative that bends the way, 9/4 as much.
+    If the curvature is wrong by a share ρ, the step gains less by ρ of the decrement, and ρ² of
+    it remains; if the third derivative is the cause, 9/4 as much.
     """
     return 2.25 * (decrement - fell) * ((decrement - fell) / decrement)  # of any unit
 
 
 def _limited(structure: Structure, theta: Real, step: Real) -> float:
-    """Share of a step to take so that no coefficient changes beyond recognition."""
+    """Share of a step that changes no coefficient by too much."""
     share, start = 1.0, 1
     for order in structure.sections:
         share = min(share, 1.0 / max(abs(step[start]), 1e-300))

@@ -1,9 +1,8 @@
-"""The way of the joint fit up to the choice: start, climb, begin, enrich."""
+"""The joint fit up to the choice of a structure: start, fit, find the beginning, enrich."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
@@ -19,7 +18,7 @@ from hmpim.identify.fitting.candidates import (
     spans_record,
     sums_to_noise,
 )
-from hmpim.identify.fitting.data import Data, Seen, follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -51,34 +50,34 @@ __all__ = [
 ]
 
 _SOME = 100
-"""Samples that tell at once of most inputs that they have more levels."""
+"""Samples that are enough to show, for most inputs, that they have more levels."""
 
 _LEVELS = 3
-"""Levels of a switched input: two of a binary sequence, and the rest before it."""
+"""Levels of a switched input: two of a binary sequence, and rest before it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Course:
-    """Where the joint fit of a record stands.
+    """The state of a record's joint fit.
 
     Parameters
     ----------
     data : Data
-        What all trials share.
+        The data of all trials.
     natural : {'zoh', 'foh', 'bandlimited'}
-        The assumption between the samples that all begin with.
+        The first assumption between the samples.
     alone : bool
-        Whether no other is tried.
+        Whether it is the only one.
     known : ndarray of bool, shape (n,), or None
         Input samples that were measured.
     plain, others : tuple of str
         Structures to try first, and the richer ones.
     given, counted : Seen
-        Samples as they were given, and those that count.
+        The samples as given, and those that count.
     fits : list of Fit
-        Of the plain structures.
+        Fits of the plain structures.
     settled : Fit or None
-        The best of them where it leaves white noise and the record begins at rest: it is polished.
+        The best of them, polished, if it leaves white noise and the record begins at rest.
     shared : bool
         Whether other inputs, whose fits are unfinished, move the output too.
     """
@@ -86,7 +85,7 @@ class Course:
     data: Data
     natural: Intersample
     alone: bool
-    known: NDArray[np.bool_] | None
+    known: Mask | None
     plain: tuple[StructureName, ...]
     others: tuple[StructureName, ...]
     given: Seen
@@ -102,41 +101,36 @@ class Course:
 
     @property
     def best(self) -> Fit:
-        """The fit that leaves least."""
+        """The fit with the least objective."""
         return min(self.fits, key=lambda fit: fit.objective)
 
 
 def start(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
-    valid: NDArray[np.bool_] | None,
-    known: NDArray[np.bool_] | None,
+    u: Real,
+    y: Real,
+    valid: Mask | None,
+    known: Mask | None,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
-    nuisance: NDArray[np.float64] | None,
+    nuisance: Real | None,
     shared: bool = False,
 ) -> Course:
-    """Start from the spectra, and climb with each plain structure, or an integrator that leads."""
+    """Fit each plain structure from spectra, and integrators if these lead."""
     if intersample is None and looks_held(u):
-        intersample = "zoh"  # an input that stands still and jumps does nothing else
+        intersample = "zoh"  # only a held input stands still and jumps
     natural: Intersample = "bandlimited" if intersample is None else intersample
-    data = Data(
-        u=u,
-        y=y,
-        sources={},
-        rough=rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size)),
-        nuisance=nuisance,
-    )
+    rough = rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size))
+    data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance)
     course = begun(data, natural, structures, Seen(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
     return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
 
 
 def _leading_integrators(course: Course) -> list[Fit]:
-    """Fits with an integrator, where plain structures leave much and the best of these white noise.
+    """Fits with an integrator, if plain ones are poor and the best of these leaves white noise.
 
-    A running sum wanders, and resembles its input a quarter of a period ahead or behind: what plain
-    structures make of it would mislead all that follows.
+    A running sum wanders, and resembles its input a quarter of a period ahead or behind: plain
+    fits of it would mislead all later steps.
     """
     if not is_poor(course.best, course.problem.spread):
         return []
@@ -147,7 +141,7 @@ def _leading_integrators(course: Course) -> list[Fit]:
 def begun(
     data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Seen
 ) -> Course:
-    """Climb with each plain structure; other assumptions between the samples are left to try."""
+    """Fit each plain structure under the natural assumption, the others to be tried later."""
     plain = tuple(name for name in structures if name in PLAIN)
     return Course(
         data=data,
@@ -163,7 +157,7 @@ def begun(
 
 
 def turn_ahead(course: Course) -> Course:
-    """The same with an output that is ahead of its input, where that leaves clearly less."""
+    """Assume that the output is ahead of its input, if the plain fits then improve clearly."""
     data, seen, best = course.data, course.given, course.best
     lag = data.rough.ahead
     if lag is None or best.is_white:
@@ -172,7 +166,7 @@ def turn_ahead(course: Course) -> Course:
     rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
     ahead = replace(data, rough=rough)
     counted = np.ones(level.size, dtype=bool) if seen.valid is None else seen.valid.copy()
-    counted[rough.earliest :] = False  # they answer what comes after the record
+    counted[rough.earliest :] = False  # they answer input after the record
     shorter = replace(seen, valid=counted)
     count = np.count_nonzero(counted)
     if count < PART * level.size:
@@ -185,9 +179,9 @@ def turn_ahead(course: Course) -> Course:
 
 
 def free_from_wander(course: Course) -> Course:
-    """The same from starts with the noise whitened, where its colour hides the response.
+    """Fit the plain structures with the noise whitened, where its colour hides the response.
 
-    What an integrator leaves over wanders too, and is the response.
+    Not where the best fit has a pole as slow as the record: its wander is the response.
     """
     if almost_integrates(course.best):
         return course
@@ -202,7 +196,7 @@ def free_from_wander(course: Course) -> Course:
 
 
 def interpolate_finely(course: Course) -> Course:
-    """The same with the input interpolated as closely as the noise lets it be seen."""
+    """Interpolate the input as finely as the noise makes worthwhile."""
     finer = interpolated_for(course, course.best)
     if finer is None or course.natural != "bandlimited":
         return finer or course
@@ -210,19 +204,19 @@ def interpolate_finely(course: Course) -> Course:
 
 
 def interpolated_for(course: Course, fit: Fit) -> Course | None:
-    """The same with the input interpolated as closely as a fit asks for; None where it is.
+    """The course with an interpolation as fine as a fit needs; None where it is fine enough.
 
-    What is missed between the samples biases an estimate by its share of the output; the noise
-    spreads it by its own share over the root of their number. Samples that the ends of the record
-    spoil are no noise: the median does not see them.
+    The interpolation error biases an estimate by its share of the output; the noise scatters it
+    by its own share over the root of the number of samples. The noise is taken from a median,
+    which ignores samples that the ends of the record spoil.
     """
     if course.alone and course.natural != "bandlimited":
         return None
     problem = course.data.problem("bandlimited", course.counted)
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
     spread = max(float(np.std(fit.prediction)), np.finfo(float).tiny)
-    seen = median(np.abs(residual[:: every_of(residual.size)])) / BULK / spread
-    wanted = PART * seen / float(np.sqrt(residual.size))
+    noise = median(np.abs(residual[:: every_of(residual.size)])) / BULK / spread
+    wanted = PART * noise / float(np.sqrt(residual.size))
     if wanted * TWICE >= course.data.precision:
         return None
     used = problem.source.oversampling
@@ -238,9 +232,9 @@ def completed(course: Course) -> Course:
 
 
 def find_beginning(course: Course) -> Course:
-    """The samples that count, and the fits to them: the record may not begin at rest."""
+    """Fit the plain structures to the samples that count: the record may not begin at rest."""
     data, natural, seen = course.data, course.natural, course.given
-    if not course.best.converged:  # what is left of the way down looks like a free response
+    if not course.best.converged:  # an unfinished fit leaves what looks like a free response
         ended = refit(course.problem, course.best)
         course = replace(course, fits=[ended if f is course.best else f for f in course.fits])
     fits, settled = course.fits, None
@@ -250,7 +244,7 @@ def find_beginning(course: Course) -> Course:
     counted = count_in(data, natural, fits, seen, course.known)
     if counted.begins is None and settled is None and in_motion(data.u):
         counted = _in_motion(course) or counted
-    if counted.begins is not None:  # from rest those fits ended anywhere
+    if counted.begins is not None:  # fits that assumed rest may have ended anywhere
         problem = data.problem(natural, counted)
         integrating = [refit(problem, fit) for fit in fits if fit.structure.integrators]
         fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits) + integrating
@@ -263,9 +257,9 @@ def find_beginning(course: Course) -> Course:
 
 
 def _in_motion(course: Course) -> Seen | None:
-    """Samples that count from a beginning in mid-motion; None unless that leaves clearly less.
+    """Samples that count if the record begins in mid-motion; None unless fits then improve clearly.
 
-    From rest such fits ended so far off that no free response of theirs is of use.
+    Fits that assumed rest ended so far off that their own free responses are of no use.
     """
     data, seen = course.data, course.given
     begun = begin_at(seen, max(data.rough.lag, 0) + REACH, data.y.size)
@@ -284,7 +278,7 @@ def _again(course: Course, fits: list[Fit]) -> list[Fit]:
 
 
 def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
-    """Fit the plain structures to other samples, or beside other rows, from where they ended.
+    """Fit the plain structures to other samples, or with other rows, from where they ended.
 
     Parameters
     ----------
@@ -301,15 +295,15 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
 
 
 def set_free(course: Course, fit: Fit) -> Course | None:
-    """The samples that count from mid-motion, and a fit to them; None unless white noise is left.
+    """Fit from mid-motion; None unless that leaves white noise.
 
     Parameters
     ----------
     course : Course
         The plain fits so far.
     fit : Fit
-        Of any structure, as it ended beside other rows. What drifted may be its free response, or
-        that of a washout.
+        Of any structure, from a problem with nuisance rows. The drift in them may be the fit's
+        free response, or that of a washout.
     """
     data, given = course.data, course.given
     counted = begin_at(given, max(int(np.ceil(fit.delay)), 0) + REACH, data.y.size)
@@ -324,57 +318,45 @@ def set_free(course: Course, fit: Fit) -> Course | None:
     return replace(course, others=(), counted=counted, fits=[free], settled=None)
 
 
-def continue_between(course: Course) -> list[tuple[Intersample, Fit]]:
-    """The fits, and the leading ones under the other assumptions between the samples."""
+def continue_between(course: Course) -> Fits:
+    """All fits, the leading ones also under the other assumptions between the samples."""
     return fit_under_each_assumption(
-        course.data,
-        course.natural,
-        course.fits,
-        course.counted,
-        course.others,
-        alone=course.alone,
+        course.data, course.natural, course.fits, course.counted, course.others, alone=course.alone
     )
 
 
-def is_unanswered(course: Course, fitted: list[tuple[Intersample, Fit]]) -> bool:
-    """Whether neither the likelihood nor a test without a model sees an answer."""
+def is_unanswered(course: Course, fitted: Fits) -> bool:
+    """Whether neither the likelihood nor a test without a model finds an answer."""
     mode, best = min(fitted, key=lambda item: item[1].objective)
     problem = course.data.problem(mode, course.counted)
     return course.data.says_nothing(problem, best)
 
 
-def enrich(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[tuple[Intersample, Fit]]]:
-    """Richer structures while what is left over follows the input, then the plain ones again.
+def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
+    """Fit richer structures while the residual follows the input, then the plain ones again.
 
-    What is little, and would be doubted all the same, counts as a lack of dynamics only where a
-    richer structure leaves white noise: of real hardware it is something else as a rule.
+    A small residual that follows the input counts as missing dynamics only where a richer
+    structure leaves white noise: on real hardware it usually has another cause.
     """
     data, plain = course.data, course.plain
     mode, best = min(fitted, key=lambda item: item[1].objective)
     owed = owed_to_input(data.problem(mode, course.counted), best, data)
-    asked = not plain or owed > MATERIAL or spans_record(best)
-    if not asked and owed <= WORTH:
+    required = not plain or owed > MATERIAL or spans_record(best)
+    if not required and owed <= WORTH:
         return course, fitted
     fits = course.fits
     richer = fit_rich(
-        data,
-        course.problem,
-        fits,
-        course.others,
-        all_of_them=not plain,
-        shared=course.shared,
+        data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
     )
-    if not asked and not any(fit.is_white for fit in richer):
+    if not required and not any(fit.is_white for fit in richer):
         return course, fitted
     if richer and course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
-        # At rest after all, it was the structure that was wrong, and not the beginning.
-        rests = resting.begins is None
-        counted = resting if rests else begin_later(course.counted, leading)
+        # If it is at rest after all, the structure was wrong, and not the beginning.
+        at_rest = resting.begins is None
+        counted = resting if at_rest else begin_later(course.counted, leading)
         if counted is not None:
             course = replace(course, counted=counted)
             every = _again(course, [*fits, *richer])
@@ -385,45 +367,35 @@ def enrich(
     return course, continue_between(course)
 
 
-def _level(
-    y: NDArray[np.float64],
-    nuisance: NDArray[np.float64] | None,
-    valid: NDArray[np.bool_] | None,
-) -> NDArray[np.float64]:
-    """An output for spectra: without what its rows explain, gaps filled."""
-    level = y if nuisance is None else y - _regressed(nuisance, y, valid)
-    return bridged(level, valid)
+def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:
+    """An output for spectra: without its regression on the nuisance rows, gaps filled."""
+    if nuisance is not None:
+        counts = slice(None) if valid is None else valid
+        every = np.vstack([nuisance, np.ones(y.size)])[:, counts]
+        y = y - solved(every @ every.T, every @ y[counts])[:-1] @ nuisance
+    return bridged(y, valid)
 
 
-def _regressed(
-    rows: NDArray[np.float64], y: NDArray[np.float64], valid: NDArray[np.bool_] | None
-) -> NDArray[np.float64]:
-    """What of an output the rows explain beside a constant, by least squares."""
-    counts = slice(None) if valid is None else valid
-    every = np.vstack([rows, np.ones(y.size)])[:, counts]
-    weights = solved(every @ every.T, every @ y[counts])[:-1]
-    return np.asarray(weights @ rows)
-
-
-def bridged(y: NDArray[np.float64], valid: NDArray[np.bool_] | None) -> NDArray[np.float64]:
-    """Fill samples that do not count by straight lines, for spectra; all do if None."""
+def bridged(y: Real, valid: Mask | None) -> Real:
+    """Fill samples that do not count by straight lines, for spectra; all count if None."""
     if valid is None:
         return y
     index = np.arange(y.size)
     return np.interp(index, index[valid], y[valid])
 
 
-def looks_held(u: NDArray[np.float64]) -> bool:
+def looks_held(u: Real) -> bool:
     """Whether an input stands still most of the time and then jumps, as a held one does.
 
-    What moves between two samples moves at one instant only if it stood before and stands after;
-    what has three levels at most and goes from one to another again and again is switched. What is
-    rounded stands still too; it then moves by one step, its least.
+    A move between two samples is a jump if the input stands still before and after. An input with
+    at most three levels that changes between them again and again is switched. A rounded input
+    stands still too, but mostly moves by its smallest step.
     """
     jumps = np.abs(np.diff(u))
     moves = jumps > 0
     count = int(np.count_nonzero(moves))
-    if count > _LEVELS and _has_few_levels(u):
+    some = u[:: u.size // _SOME + 1]  # these are checked first
+    if count > _LEVELS and all(np.unique(values).size <= _LEVELS for values in (some, u)):
         return True
     if 2 * count > moves.size + 1:
         return False
@@ -432,9 +404,3 @@ def looks_held(u: NDArray[np.float64]) -> bool:
         return False
     rounded = median(jumps[alone]) <= TWICE * float(jumps[moves].min())
     return bool(jumps.max() > FEW * np.ptp(u) or not rounded)
-
-
-def _has_few_levels(u: NDArray[np.float64]) -> bool:
-    """Whether an input stands at three levels at most; a few samples deny it."""
-    some = u[:: u.size // _SOME + 1]
-    return np.unique(some).size <= _LEVELS and np.unique(u).size <= _LEVELS

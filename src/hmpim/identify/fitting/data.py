@@ -1,12 +1,11 @@
-"""What all trials of one joint fit share."""
+"""The data that all trials of one joint fit share, and refits to other data."""
 
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
@@ -27,6 +26,7 @@ __all__ = [
     "RETURNS",
     "TASTE",
     "Data",
+    "Fits",
     "Seen",
     "follows",
     "hopeless_beside",
@@ -38,27 +38,30 @@ __all__ = [
 ]
 
 RETURNS = 12
-"""Steps that a fit is taken from where it ended when what it is fitted to has changed."""
+"""Most steps from where a fit ended, when the data have changed."""
 
 TASTE = 4
-"""Steps taken from each start before the best one is followed to its end."""
+"""Steps from each start before the best one is fitted to convergence."""
+
+Fits = list[tuple[Intersample, Fit]]
+"""Fits, each with its assumption between the samples."""
 
 prepared = kept(prepare_input)
-"""An input prepared under an assumption, as `hmpim.model.sampled.prepare_input` does it."""
+"""`hmpim.model.sampled.prepare_input`, its results kept."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Seen:
-    """Which samples count, and from where on the state that a record begins with is fitted."""
+    """Which samples count, and from which sample an unknown initial state is fitted."""
 
-    valid: NDArray[np.bool_] | None
+    valid: Mask | None
     begins: int | None
 
     @property
     def first(self) -> int | None:
-        """The first sample that counts from there; None for a record that begins at rest.
+        """First sample that counts from `begins` on; None for a record that begins at rest.
 
-        A free response that began before would grow backwards, without bound.
+        A free response that began earlier would grow without bound backwards in time.
         """
         if self.begins is None or self.valid is None:
             return self.begins
@@ -67,18 +70,19 @@ class Seen:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Data:
-    """What every trial shares; inputs are prepared for an assumption when first asked for.
+    """The data of every trial; the input is prepared for an assumption when first needed.
 
-    The search asks it what a fit leaves over, so that `CompressedData` can answer without samples.
+    The search examines residuals through these methods alone, so that `CompressedData` can do so
+    without samples.
     """
 
-    u: NDArray[np.float64]
-    y: NDArray[np.float64]
+    u: Real
+    y: Real
     sources: dict[tuple[Intersample, bool], SampledInput]
     rough: RoughResponse
-    nuisance: NDArray[np.float64] | None
-    noise: NDArray[np.float64] | None = None
-    level: NDArray[np.float64] | None = None
+    nuisance: Real | None
+    noise: Real | None = None
+    level: Real | None = None
     precision: float = PRECISION
 
     def problem(self, mode: Intersample, seen: Seen) -> Problem:
@@ -99,7 +103,7 @@ class Data:
 
     @property
     def plain(self) -> Self:
-        """The same, the noise taken for white and of one level."""
+        """The same with noise assumed white and of constant level."""
         return replace(self, noise=None, level=None)
 
     @property
@@ -109,24 +113,24 @@ class Data:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Band in which a response was sought, in cycles per sample."""
+        """Band of the rough response, in cycles per sample."""
         omega = self.rough.omega
         return float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
 
     def misfit(self, fit: Fit) -> Misfit:
-        """How much of what a fit leaves over still follows the input."""
+        """How much of a fit's residual still follows the input."""
         return misfit(self.u, fit.residual, delay=fit.delay, band=self.band)
 
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
-        """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
+        """Autoregression of a fit's residual, 1 first; 1 alone where it is white."""
         return autoregression(fit.residual, problem.valid)
 
     def level_left(self, problem: Problem, fit: Fit, noise: Real) -> Real | None:
-        """How loud at each sample what an autoregression leaves is; None where it is steady."""
+        """Level of the innovations at each sample; None where it is steady."""
         return level_of(problem.coloured(noise).innovations(fit.prediction, fit.residual))
 
     def rough_left(self, fit: Fit) -> RoughResponse:
-        """Rough response of what a fit leaves over."""
+        """Rough response of a fit's residual."""
         return rough_response(self.u, fit.residual, longest_delay=0, lag=self.rough.lag)
 
     def says_nothing(self, problem: Problem, fit: Fit, *, least: float = SEARCHED) -> bool:
@@ -134,39 +138,32 @@ class Data:
         return says_nothing(self.u, problem, fit, self.band, least=least)
 
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
-        """What the record says of one more pole beside a fit."""
+        """Test a fit for one more pole."""
         return hidden_pole(problem, fit)
 
 
 def follows(data: Data, fit: Fit) -> bool:
-    """Whether what a fit leaves over still follows the input."""
+    """Whether a fit's residual still follows the input."""
     return data.misfit(fit).probability < FALSE_ALARM
 
 
-def shifted(
-    theta: NDArray[np.float64], origin: Intersample, mode: Intersample
-) -> NDArray[np.float64]:
-    """Parameters as a start under another assumption: held, the delay fits half a sample less."""
+def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
+    """Parameters as a start under another assumption: a held input has half a sample less delay."""
     held = 0.5 * (float(origin == "zoh") - float(mode == "zoh"))
     return np.asarray(theta + held * (np.arange(theta.size) == 0))
 
 
 def polished(problem: Problem, fit: Fit) -> Fit:
     """The same fit at the final precision."""
-    return fit_structure(problem, fit.structure, fit.theta, precision=problem.final)
+    return refit(problem, fit, precision=problem.final)
 
 
-def refit_all(
-    data: Data,
-    fitted: list[tuple[Intersample, Fit]],
-    seen: Seen,
-    *,
-    hopeful: float = np.inf,
-) -> list[tuple[Intersample, Fit]]:
+def refit_all(data: Data, fitted: Fits, seen: Seen, *, hopeful: float = np.inf) -> Fits:
     """Fit all structures to other data, from where they ended, the leading one first.
 
-    A fit that promises to leave much more than that, or no less than a plainer one with a white
-    residual, is given up; one that left `hopeful` or more before is only evaluated.
+    A fit that promises a much larger residual than that one, or no smaller one than a plainer fit
+    with a white residual, is given up. A fit whose objective was `hopeful` or more is only
+    evaluated.
     """
     leading = min(range(len(fitted)), key=lambda i: fitted[i][1].objective)
     by_size = sorted(range(len(fitted)), key=lambda i: fitted[i][1].structure.parameters)
@@ -191,6 +188,6 @@ def hopeless_beside(structure: Structure, rivals: list[Fit]) -> float:
     return min([TWICE * least, *white])
 
 
-def refit(problem: Problem, fit: Fit) -> Fit:
-    """Fit the same structure to other data, from where it ended."""
-    return fit_structure(problem, fit.structure, fit.theta)
+def refit(problem: Problem, fit: Fit, *, precision: float = 1e-2, hopeless: float = np.inf) -> Fit:
+    """Fit the same structure to other data, from where it ended, as `fit_structure` does."""
+    return fit_structure(problem, fit.structure, fit.theta, precision=precision, hopeless=hopeless)

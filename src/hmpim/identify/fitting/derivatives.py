@@ -1,4 +1,4 @@
-"""Derivatives of a fit's prediction, less what drift and initial state can do, and products."""
+"""Derivatives of a fit's prediction, drift and initial state projected out, and their products."""
 
 from itertools import pairwise
 
@@ -18,20 +18,18 @@ def jacobian(
 ) -> Real:
     """Derivatives of the prediction with respect to theta, then to `fit.linear`.
 
-    Drift and initial state, where they are fitted, are projected out: the inverse of the rows'
-    Gram matrix then is the covariance with them unknown.
+    Drift and initial state, where they are fitted, are projected out, so that the inverse of the
+    rows' Gram matrix is the covariance with them unknown.
 
     Parameters
     ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Where the derivatives are taken.
+    problem, fit : Problem, Fit
+        The data, and the fit at which derivatives are taken.
     *more : ndarray, shape (n,)
         Rows of other parameters, treated alike.
     part : Part or SampledPart, optional
-        What the input does there, where it is known; a free response that it has and the problem
-        has not is left alone.
+        The input's rows at the fit, if already computed. Its free response is ignored where the
+        problem has none.
 
     Returns
     -------
@@ -42,20 +40,20 @@ def jacobian(
     bias = np.ones((1, problem.y.size))
     rows = np.vstack([part.slopes(fit.linear[:-1], fit.initial), part.rows, bias, *more])
     rows[fit.theta.size] += part.level
-    return _apart(problem, part, rows)
+    return _projected(problem, part, rows)
 
 
 def combined(problem: Problem, fit: Fit, weights: Real, row: Real) -> Real:
-    """Return a row, (n,), plus the rows of `jacobian` times weights, (p,), treated as they are."""
+    """Return a row, (n,), plus weights, (p,), times the rows of `jacobian`, treated alike."""
     part, size = part_of(problem, fit.structure, fit.theta), fit.theta.size
     out = row + part.driven(weights[size:-1]) + weights[-1]
     for here in problem.stretches(0, row.size):
         out[here] += weights[:size] @ part.slopes(fit.linear[:-1], fit.initial, here)
-    return np.asarray(_apart(problem, part, out[None])[0])
+    return np.asarray(_projected(problem, part, out[None])[0])
 
 
-def _apart(problem: Problem, part: Part | SampledPart, rows: Real) -> Real:
-    """Rows as samples count, without what drift and initial state can do."""
+def _projected(problem: Problem, part: Part | SampledPart, rows: Real) -> Real:
+    """Rows as samples count, drift and initial state projected out."""
     others = _others(problem, part)
     counted = problem.masked(rows)
     return without(counted, problem.masked(np.vstack(others))) if others else counted
@@ -77,7 +75,7 @@ def products(
 ) -> Real:
     """Inner products of the rows of `jacobian` and of a residual, which comes last.
 
-    They are summed stretch by stretch, so that no row is as long as the record unless samples are
+    They are summed in stretches, so that no row is as long as the record unless samples are
     whitened.
 
     Parameters
@@ -87,7 +85,7 @@ def products(
     residual : ndarray, shape (n,)
         0 where a sample does not count.
     edges : tuple of int
-        Samples at which a further span begins; each span's products are returned separately.
+        Samples at which a new span begins; each span's products are returned separately.
 
     Returns
     -------

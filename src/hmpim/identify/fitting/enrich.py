@@ -1,8 +1,8 @@
 """Richer structures, for a record that the plain ones do not explain.
 
-They are tried only where what the best plain structure leaves over still follows the input and
-is worth more than a small share of the output: every simulation pays for every pole, and with
-enough samples the smallest imperfection of real hardware is "significant".
+They are tried only where the residual of the best plain structure follows the input and is more
+than a small share of the output: every pole slows all simulations, and with enough samples the
+smallest imperfection of real hardware is "significant".
 """
 
 from dataclasses import dataclass, replace
@@ -22,11 +22,11 @@ __all__ = [
     "PLAIN",
     "RICH",
     "Proposal",
-    "about",
     "integrator_starts",
     "is_response",
     "members",
     "proposals",
+    "with_fit",
     "without_fast",
 ]
 
@@ -55,37 +55,28 @@ INTEGRATING: tuple[StructureName, ...] = (
 )
 
 _DELAYS = 7
-"""How many delays to start from, about that of the best fit so far."""
+"""Number of delays to start from, around that of the best fit so far."""
 
 
 def integrator_starts(rough: RoughResponse, structure: Structure) -> list[Real]:
-    """Starts for an integrator: those of the rest of it, from the input's running sum.
+    """Starts for an integrator: those of its other poles, from the input's running sum.
 
     Parameters
     ----------
     rough : RoughResponse
-        Of the output against the running sum of the input.
+        From the running sum of the input to the output.
     structure : Structure
-        An integrator, alone or with a lag.
+        An integrator, alone or with other poles.
     """
-    rest = STRUCTURES[PLAIN[structure.order]]  # the plain one of each order
-    return starting_values(rough, rest)
+    return starting_values(rough, STRUCTURES[PLAIN[structure.order]])  # one for each order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Proposal:
-    """A structure with zeros or more than two poles, and where to start it.
+    """A structure with zeros or more than two poles, and its starts, the most promising first.
 
-    Parameters
-    ----------
-    structure : Structure
-        What to fit.
-    starts : tuple of ndarray, shape (1 + order,)
-        Delay in samples, parameters of the denominator's sections; the most promising first.
-    error : float
-        Share of the rough response's power that the best start misses.
-    promising : bool
-        Whether the least of all is not a small part of it.
+    `error` is the share of the rough response's power that the best start misses; `promising` says
+    whether no other structure misses far less.
     """
 
     structure: Structure
@@ -99,27 +90,13 @@ def proposals(
     structures: list[Structure],
     fit: Fit,
     *,
-    count: int = 5,
     all_of_them: bool = False,
 ) -> list[Proposal]:
-    """Structures with zeros or more than two poles that the response allows, promising ones first.
+    """Which of `structures` the rough response supports, promising ones first.
 
-    Sanathanan and Koerner's iteration on the rough response starts them, at several delays about
-    that of the best fit so far, with poles in the right half plane mirrored; each start then climbs
-    there by output error.
-
-    Parameters
-    ----------
-    rough : RoughResponse
-        From `hmpim.identify.fitting.start.rough_response`.
-    structures : list of Structure
-        What may be fitted.
-    fit : Fit
-        The best fit so far.
-    count : int
-        At most so many starts each.
-    all_of_them : bool
-        Whether those too that the rough response gives no reason to try.
+    Sanathanan and Koerner's iteration on the rough response yields starts at several delays around
+    that of the best `fit` so far, poles in the right half plane mirrored; each start is then
+    improved there by output error. With `all_of_them`, structures without support are kept too.
     """
     if not structures:
         return []
@@ -137,7 +114,7 @@ def proposals(
         powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
         for i in np.argsort(errors):
             coefficients = _sections(denominators[i], structure)
-            if coefficients is not None and len(starts) < count:
+            if coefficients is not None and len(starts) < 5:
                 theta = theta_of(structure, coefficients / rough.omega[-1] ** powers)
                 starts.append(np.append(delays[i], theta))
         if starts:
@@ -146,33 +123,24 @@ def proposals(
     if not all_of_them:
         out = [proposal for proposal in out if proposal.error < (1 - FEW) * _error(rough, fit)]
     least = min((proposal.error for proposal in out), default=0.0)
-
     out = [replace(p, promising=PART**2 * p.error <= least) for p in out]
     return sorted(out, key=lambda p: (not p.promising, p.structure.parameters))
 
 
 def is_response(rough: RoughResponse, fit: Fit) -> bool:
-    """Whether what a fit leaves of the rough response is a response for the most part.
+    """Whether a fit's residual in the rough response is mostly a response.
 
-    Two modes have poles and zeros enough to follow most of what is no noise.
+    Two modes have enough poles and zeros to follow most of any response.
     """
     tried = proposals(rough, [STRUCTURES["two_modes"]], fit)
     return bool(tried) and tried[0].error < PART * _error(condensed(rough), fit)
 
 
 def without_fast(fit: Fit, structure: Structure) -> Real | None:
-    """Start of a plainer structure: the slowest poles of a fit; what the others do is delay.
+    """Start of a plainer structure, (1 + order,): the slowest poles of a fit, the others as delay.
 
-    Parameters
-    ----------
-    fit : Fit
-        With as many poles, or more.
-    structure : Structure
-        The plainer one; its integrator, if the fit has none, stands for the slowest pole.
-
-    Returns
-    -------
-    ndarray, shape (1 + order,), or None where pairs of poles do not divide so
+    If only the structure has an integrator, that replaces the slowest pole. None where this would
+    split a pair of poles.
     """
     whole = fit.denominator[fit.structure.integrators :]
     poles = sorted(np.roots(whole[::-1]), key=lambda p: (abs(p), p.imag))
@@ -190,22 +158,22 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
         return None
     late = fit.delay + whole[1] + sum((1.0 / p).real for p in slow)
     late -= denominator[1] if kept else 0.0
-    if structure.zeros == structure.dc_zeros:  # no zero of its own: what the fit's do is delay too
+    if structure.zeros == structure.dc_zeros:  # without zeros of its own: the fit's become delay
         first, second = (*fit.numerator, 0.0)[structure.dc_zeros : structure.dc_zeros + 2]
         late -= second / first if first else 0.0
     return np.concatenate([[late], theta_of(structure, coefficients)])
 
 
-def about(left: RoughResponse, fit: Fit) -> RoughResponse:
-    """The rough response of an output, from that of what a fit leaves over of it.
+def with_fit(residual: RoughResponse, fit: Fit) -> RoughResponse:
+    """The rough response of an output, from that of a fit's residual.
 
-    Leakage is proportional to the signal transformed, so the residual has little.
+    Leakage is proportional to the transformed signal, so a residual has little.
     """
-    return replace(left, response=_modelled(left, fit) + left.response)
+    return replace(residual, response=_modelled(residual, fit) + residual.response)
 
 
 def _modelled(rough: RoughResponse, fit: Fit) -> Complex:
-    """What a fit predicts of a rough response."""
+    """A fit's prediction of a rough response."""
     s = 1j * rough.omega
     b, a = (np.polynomial.polynomial.polyval(s, c) for c in (fit.numerator, fit.denominator))
     return np.asarray(b / a * np.exp(-1j * rough.omega * (fit.delay - rough.lag)))
@@ -219,7 +187,7 @@ def _error(rough: RoughResponse, fit: Fit) -> float:
 
 
 def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> Real:
-    """The best plain fit with its missing sections added where they hardly matter; tried first."""
+    """The best plain fit, the missing sections added where they hardly matter."""
     theta = list(fit.theta)
     have = fit.structure.sections
     if not have:
@@ -252,7 +220,7 @@ def _sections(denominator: Real, structure: Structure) -> Real | None:
             out += [-1 / p - 1 / q, 1 / (p * q)]
         elif real:
             out += [-1 / real.pop(0)]
-        else:  # two pairs cannot be three poles
+        else:  # two pairs do not make three poles
             return None
     values = np.array(out)
     return np.maximum(values, 1e-4) if np.all(np.isfinite(values)) else None

@@ -1,16 +1,15 @@
 """Maximum likelihood at given structures: delay, dynamics, scale factor and bias together.
 
-With white Gaussian noise the likelihood is greatest where the sum of squares of the
-residual is least. Delay and denominator enter nonlinearly, all else linearly; the linear
-parameters are solved exactly at each step (variable projection: G. H. Golub and
-V. Pereyra, SIAM J. Numer. Anal. 10, 1973), the others by Levenberg-Marquardt, with derivatives in
-closed form. One input or several, with a drift or without, from rest or in mid-motion: there is
-one optimiser.
+With white Gaussian noise the likelihood is greatest where the residual's sum of squares is
+least. Delay and denominator enter nonlinearly, all else linearly. The linear parameters are solved
+exactly at each step (variable projection: G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10,
+1973), the others by Levenberg-Marquardt with derivatives in closed form. One optimiser serves one
+input or several, with or without a drift, from rest or in mid-motion.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, singledispatch
 from typing import Protocol
 
@@ -40,10 +39,10 @@ __all__ = [
 ]
 
 _LONGEST_TIME_CONSTANT = 2.0
-"""In record lengths; a slower pole cannot be told from an integrator."""
+"""In record lengths; a slower pole cannot be distinguished from an integrator."""
 
 _SHORTEST_TIME_CONSTANT = 0.02
-"""In samples; a faster pole cannot be told from none."""
+"""In samples; a faster pole cannot be distinguished from none."""
 
 _SHAPES = (1e-4, 1e6)
 """Bounds of 1 / (4ζ²): from a second pole 10 000 times as fast as the first, to ζ = 0.0005."""
@@ -52,38 +51,38 @@ _CRITICAL = 0.25
 """1 / (4ζ²) at critical damping, above which poles oscillate."""
 
 FORGETS = 5.0
-"""Time constants after which what came before is forgotten (0.7 % left)."""
+"""Time constants after which a state is forgotten (0.7 % remains)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fit:
-    """Where a fit ended, for one input.
+    """The result of a fit, for one input.
 
     Parameters
     ----------
     structure : Structure
-        What was fitted.
+        The fitted structure.
     theta : ndarray, shape (1 + order,)
         Delay in samples, then the parameters of the denominator's sections (`coefficients_of`),
         time in samples.
     linear : ndarray, shape (m + 1,)
-        Numerator coefficients by rising power of s (the first is the scale factor), or what
-        `numerator_of` takes instead; bias.
+        Numerator coefficients by rising power of s (the first is the scale factor), or the gains
+        that `numerator_of` takes instead; bias.
     prediction : ndarray, shape (n,)
-        Output of the fitted model, drift and free response included; where there are several
-        inputs, what this one, bias and drift make of it.
+        Output of the fitted model, drift and free response included; with several inputs, the
+        part due to this one, bias and drift.
     residual : ndarray, shape (n,)
-        Output less prediction of all, not whitened; 0 where a sample does not count.
+        Output less the prediction from all inputs, not whitened; 0 where a sample does not count.
     cost : float
         Sum of squares of the residual.
     objective : float
-        What was least: sum of squares of the residual, whitened where the problem says how.
+        The minimised sum of squares: of the residual, whitened if the problem whitens.
     converged : bool
         Whether the last step was negligible.
     nuisance : ndarray, shape (k,)
-        What multiplies the problem's nuisance rows.
+        Weights of the problem's nuisance rows.
     initial : ndarray, shape (order,) or (0,)
-        What multiplies the free responses.
+        Weights of the free responses.
     """
 
     structure: Structure
@@ -114,25 +113,18 @@ class Fit:
         return numerator_of(self.structure, coefficients, self.linear[:-1])
 
     @property
-    def bare(self) -> "Fit":
-        """The same without its samples, for a fit that will only serve as a start of another."""
-        if not self.prediction.size:
-            return self
-        return replace(self, prediction=np.empty(0), residual=np.empty(0))
-
-    @property
     def memory(self) -> float:
         """Samples after which a state is forgotten: five times the slowest time constant."""
         return FORGETS * slowest_time_constant(self.denominator)
 
     @property
     def is_white(self) -> bool:
-        """Whether the residual passes for white."""
+        """Whether the residual passes a test for white noise."""
         return is_white(self.residual)
 
     @property
     def is_steady(self) -> bool:
-        """Whether the residual keeps its level, as far as its squares say."""
+        """Whether the residual keeps its level, by a test of its squares."""
         return is_steady(self.residual)
 
     @property
@@ -145,11 +137,11 @@ class Evaluation(Evaluated, Protocol):
     """A model of every input at given parameters."""
 
     def fits(self, *, converged: bool) -> "list[Fit]":
-        """What each input makes of the output."""
+        """The fit of each input."""
 
 
 class _Known:
-    """What no parameter moves: output and fixed rows as they count, and their products."""
+    """Quantities that no parameter moves: output and fixed rows, masked, and their products."""
 
     def __init__(self, problem: Problem) -> None:
         self.target = problem.masked(problem.y)
@@ -160,7 +152,7 @@ class _Known:
 
 
 class _Evaluation:
-    """All inputs at given parameters: linear parameters solved, residual, derivatives on demand."""
+    """All inputs at given parameters: linear parameters, residual, and derivatives on demand."""
 
     def __init__(
         self, problems: Sequence[Problem], parts: Sequence[Part | SampledPart], known: _Known
@@ -177,7 +169,7 @@ class _Evaluation:
         self._gram[own:, :own] = known.fixed @ self.counted.T
         self._gram[:own, own:] = self._gram[own:, :own].T
         self._gram[own:, own:] = known.gram
-        if first.source.degree == SAMPLES_ALONE:  # rounding is all the noise there may be
+        if first.source.degree == SAMPLES_ALONE:  # rounding may be the only noise
             every = np.vstack([self.counted, known.fixed])
             self.linear, _ = solved_exactly(every, known.target)
             self.residual = known.target - self.linear @ every
@@ -186,15 +178,14 @@ class _Evaluation:
             self.linear = solved(self._gram, cross)
             self.residual = np.empty_like(known.target)
             for here in spans(0, known.target.size):
-                left = known.target[here] - self.linear[:own] @ self.counted[:, here]
-                left -= self.linear[own:] @ known.fixed[:, here]
-                self.residual[here] = left
+                residual = known.target[here] - self.linear[:own] @ self.counted[:, here]
+                residual -= self.linear[own:] @ known.fixed[:, here]
+                self.residual[here] = residual
         self.cost = float(self.residual @ self.residual)
 
     def weights(self) -> list[Real]:
         """Linear parameters: numerator and initial state of each input, then the fixed rows'."""
-        edges = np.cumsum([block.shape[0] for block in self._blocks])
-        return np.split(self.linear, edges)
+        return np.split(self.linear, np.cumsum([block.shape[0] for block in self._blocks]))
 
     def slopes(self, here: slice) -> Real:
         """Derivatives of the prediction by all delays and denominators, as samples count."""
@@ -205,7 +196,7 @@ class _Evaluation:
         ]
         for problem, own in zip(self.problems, rows, strict=True):
             if problem.shortest_delay == problem.longest_delay:
-                own[0] = 0.0  # a delay that is kept
+                own[0] = 0.0  # a fixed delay
         return self.problems[0].masked(rows[0] if len(rows) == 1 else np.vstack(rows), here)
 
     @property
@@ -227,12 +218,12 @@ class _Evaluation:
         return inner - mixed @ solved(self._gram, mixed.T), moment
 
     def fits(self, *, converged: bool) -> list[Fit]:
-        """What each input makes of the output."""
+        """The fit of each input."""
         weights = self.weights()
         fixed, problem, residual = weights[-1], self.problems[0], self.residual
         levels = [weights[2 * i][0] * part.level for i, part in enumerate(self.parts)]
-        bias = fixed[0] - sum(levels)  # as if no input stood anywhere but at zero
-        if problem.noise is not None or problem.whitening is not None:
+        bias = fixed[0] - sum(levels)  # for inputs that rest at zero
+        if problem.filtered:
             moved = self.linear[: -fixed.size] @ self.rows
             residual = problem.y - moved - fixed @ self._known.plain
             if problem.valid is not None:
@@ -263,7 +254,7 @@ class _Evaluation:
 
 
 def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:
-    """Keep delay and time constants where the record can tell them."""
+    """Limit delay and time constants to what the record can determine."""
     delays = (problem.shortest_delay, problem.longest_delay)
     bounded = within_reach(structure, theta, delays=delays, samples=problem.source.samples)
     return _below_nyquist(structure.sections, bounded) if problem.source.degree == 0 else bounded
@@ -273,14 +264,14 @@ def bounded_for(problem: Problem, structure: Structure, theta: Real) -> Real:
 def evaluating(
     first: Problem, problems: Sequence[Problem], structures: Sequence[Structure]
 ) -> Callable[[Sequence[Real]], Evaluation]:
-    """Return what evaluates inputs at given parameters, here by samples.
+    """Return a function that evaluates all inputs at given parameters, here by samples.
 
     Other kinds of problem register a function of their own.
 
     Parameters
     ----------
     first : Problem
-        The first input's, whose kind decides.
+        That of the first input, whose kind decides.
     problems, structures
         As for `fit_together`.
     """
@@ -296,7 +287,7 @@ def evaluating(
 def within_reach(
     structure: Structure, theta: Real, *, delays: tuple[float, float], samples: int
 ) -> Real:
-    """Keep a delay between two, and time constants where so many samples can tell them.
+    """Limit a delay to a range, and time constants to what so many samples can determine.
 
     Examples
     --------
@@ -314,8 +305,8 @@ def within_reach(
 def _below_nyquist(sections: tuple[int, ...], theta: Real) -> Real:
     """Keep oscillating modes slower than half the sampling rate.
 
-    Samples of a response to a held input show a faster one as its alias: at the sampling rate a
-    real pole. `theta` is changed in place.
+    In samples of a response to a held input a faster mode appears as its alias, and one at the
+    sampling rate as a real pole. `theta` is changed in place.
     """
     at = 1
     for order in sections:
@@ -329,7 +320,7 @@ def _below_nyquist(sections: tuple[int, ...], theta: Real) -> Real:
 
 @lru_cache(maxsize=256)
 def _reach(sections: tuple[int, ...], samples: int) -> tuple[Real, Real]:
-    """Least and greatest parameters, (1 + order,), but for the delay, of which any will do."""
+    """Least and greatest parameters, (1 + order,); the delay has no bounds here."""
     span = (np.log(_SHORTEST_TIME_CONSTANT), np.log(_LONGEST_TIME_CONSTANT * samples))
     each = [(-np.inf, np.inf)]
     for order in sections:
@@ -371,15 +362,8 @@ def fit_structure(
     Fit
         `converged` is False if the steps ran out.
     """
-    (fit,) = fit_together(
-        [problem],
-        [structure],
-        [theta],
-        iterations=iterations,
-        precision=precision,
-        hopeless=hopeless,
-    )
-    return fit
+    limits = {"precision": precision, "hopeless": hopeless}
+    return fit_together([problem], [structure], [theta], iterations=iterations, **limits)[0]
 
 
 def fit_together(
@@ -405,8 +389,7 @@ def fit_together(
     list of Fit
         One for each input, residual and cost common to all.
     """
-    kept = (kept_in_sample(*one) for one in zip(problems, structures, thetas, strict=True))
-    problems = list(kept)
+    problems = list(map(kept_in_sample, problems, structures, thetas))
 
     def bounded(moved: Sequence[Real]) -> list[Real]:
         return [bounded_for(p, s, t) for p, s, t in zip(problems, structures, moved, strict=True)]

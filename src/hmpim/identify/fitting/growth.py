@@ -1,13 +1,13 @@
-"""One more pole, at any order: chosen, left open, or excluded, as the likelihood says.
+"""One more pole, at any order: chosen, left open, or excluded by the likelihood.
 
-A pole much faster than the others looks like delay. With a pure delay τ - T beside it,
+A pole much faster than the others looks like delay. Together with a pure delay of τ - T,
 
     e^(sT) / (1 + sT) = 1 + (sT)² / 2 + ...,
 
-so the record sees q = T², not T. Its likelihood is quadratic in q, and a score test of q (C. R.
-Rao, Proc. Camb. Phil. Soc. 44, 1948) costs one response. Where that test is passed by more than
-chance, the richer structure is fitted. Schwarz's criterion chooses; a structure that is as likely,
-but for the price of its pole, is a rival that the intervals cover.
+so the record determines q = T², not T. The log-likelihood is quadratic in q, and a score test of q
+(C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948) costs one response. If that test is significant, the
+richer structure is fitted. Schwarz's criterion chooses; a structure that only loses by the price
+of its pole is a rival, which the intervals cover.
 """
 
 from collections.abc import Callable
@@ -50,37 +50,37 @@ _TOLD = 1e-6
 """Least share of a row's power, other rows projected out, that products give accurately."""
 
 _PROBE = 0.3
-"""Time constant, over the fit's own, by which the derivative with respect to q is taken."""
+"""Time constant, over the fit's own, at which the derivative with respect to q is taken."""
 
 _FARTHEST = 1.0
-"""Logarithm by which a time constant moves at most beside a pole that would not show."""
+"""Most change of a time constant's logarithm to make room for a hidden pole."""
 
 _ANY = 10_000_000
-"""Samples that bound no time constant."""
+"""A record length that bounds no time constant."""
 
 _MOST = 7
-"""Poles up to which one more is asked for."""
+"""Most poles that a structure may have in the end."""
 
 FEW_POLES = 4
-"""Poles up to which a structure may leave more than white noise."""
+"""Most poles with which a structure need not leave white noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HiddenPole:
-    """What a record says of one more pole beside a fit, T its time constant in samples.
+    """The test of a fit for one more pole, T its time constant in samples.
 
     Parameters
     ----------
     squared, std : float
-        q = T² as a score test finds it, and its standard deviation. Below 0 it stands for what
-        one more pole cannot be: a zero, or a pair of poles.
+        q = T² estimated by a score test, and its standard deviation. Below 0 no real pole but a
+        zero, or a pair of poles, is missing.
     shift : ndarray, shape (p,)
-        Change of the fit's vector with q.
+        Change of theta and the linear parameters with q.
     fit : Fit
-        The fit.
+        The tested fit.
     halves : ndarray, shape (2, p + 1, p + 1), or None
         Products of its derivatives and the whitened residual over either half of the record,
-        from `hmpim.identify.fitting.fit.products`. None for compressed records.
+        from `hmpim.identify.fitting.derivatives.products`. None for compressed records.
     """
 
     squared: float
@@ -91,7 +91,7 @@ class HiddenPole:
 
     @property
     def scale(self) -> float:
-        """Time in samples that the fit has: its poles' geometric mean, or without one its delay."""
+        """Characteristic time of the fit, in samples."""
         return scale_of(self.fit)
 
     @property
@@ -100,15 +100,15 @@ class HiddenPole:
         return float(np.sqrt(max(self.squared, 0.0) + HALF * self.std))
 
     @property
-    def is_asked_for(self) -> bool:
-        """Whether the record asks for a pole by more than chance, and one that matters."""
+    def is_significant(self) -> bool:
+        """Whether a further pole is significant, and slow enough to matter."""
         return self.squared > ONE_SIDED * self.std and self.squared > (MATERIAL * self.scale) ** 2
 
     @property
     def may_hide(self) -> bool:
-        """Whether one more pole of a chain would not show, and either is long or leaned to.
+        """Whether a chain may hide one more pole that is slow, or that the estimate supports.
 
-        Not of two poles, which the paper's sensors have, and of a sum of modes.
+        Not for two poles, which the paper's sensors have, nor for a sum of modes.
         """
         far = self.limit > PART * self.scale or self.squared > self.std
         structure = self.fit.structure
@@ -118,11 +118,11 @@ class HiddenPole:
 
 
 class Fitted(Protocol):
-    """A fit, whatever it was made from."""
+    """Anything that holds a fit."""
 
     @property
     def fit(self) -> Fit:
-        """Structure, parameters, and what was least."""
+        """The fit."""
 
 
 F = TypeVar("F", bound=Fitted)
@@ -130,16 +130,10 @@ F = TypeVar("F", bound=Fitted)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Growth(Generic[F]):
-    """Where growing ended.
+    """The result of adding poles.
 
-    Parameters
-    ----------
-    grown : tuple
-        Fits that beat the one before, the best last; empty if none did.
-    rivals : tuple
-        Fits of one more pole that are as likely, but for its price.
-    hidden : HiddenPole
-        What the record says of one more pole beside the best fit.
+    `grown` are fits that each beat the one before, the best last; `rivals` are fits with one more
+    pole that lose only by its price; `hidden` is the test of the best fit for one more pole.
     """
 
     grown: tuple[F, ...]
@@ -149,7 +143,7 @@ class Growth(Generic[F]):
 
 @cache
 def one_more_pole(structure: Structure) -> Structure:
-    """Return a structure with one more pole; a real pole that is alone gets it as partner.
+    """Return a structure with one more pole; a single real pole becomes a pair.
 
     Examples
     --------
@@ -161,24 +155,17 @@ def one_more_pole(structure: Structure) -> Structure:
     pairs = [order for order in structure.sections if order == 2]
     sections = (*pairs, *((2,) if 1 in structure.sections else (1,)))
     richer = replace(structure, sections=sections, parallel=False)
-    return _named(richer) or richer
-
-
-def _named(structure: Structure) -> Structure | None:
-    """The structure that has these poles and zeros and a name."""
-    return next(
-        (known for known in STRUCTURES.values() if replace(structure, name=known.name) == known),
-        None,
-    )
+    named = (known for known in STRUCTURES.values() if replace(richer, name=known.name) == known)
+    return next(named, richer)
 
 
 def with_pole(structure: Structure, theta: Real, lag: float) -> Real:
-    """Parameters of `one_more_pole(structure)`: a pole of time constant `lag` for as much delay.
+    """Parameters of `one_more_pole(structure)`: a pole with time constant `lag` replaces delay.
 
     Parameters
     ----------
     structure : Structure
-        Before.
+        The one without it.
     theta : ndarray, shape (1 + order,)
         Its parameters, in samples.
     lag : float
@@ -204,59 +191,49 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
 
     Parameters
     ----------
-    problem : Problem
-        The data.
-    fit : Fit
-        Any fit to them but a filter in z.
+    problem, fit : Problem, Fit
+        The data, and any fit to them except a filter in z.
     """
     row = response_to_square(problem, fit)
-    left = problem.innovations(fit.prediction, fit.residual)
-    halves = products(problem, fit, left, row, edges=(left.size // 2,))
+    residual = problem.innovations(fit.prediction, fit.residual)
+    halves = products(problem, fit, residual, row, edges=(residual.size // 2,))
     gram = halves.sum(axis=0)
-    freedom, told = max(problem.counted - gram.shape[0] + 1, 1), np.delete(np.arange(len(gram)), -2)
+    freedom = max(problem.counted - gram.shape[0] + 1, 1)
     shift = -solved(gram[:-2, :-2], gram[:-2, -2])
-    # Of what no other parameter can do: its power, and its product with the residual.
+    # Of the row's part that no other parameter can make: power, and product with the residual.
     power, along = (float(gram[-2, k] + shift @ gram[:-2, k]) for k in (-2, -1))
-    white = is_white(problem.counting(left))
+    white = is_white(problem.counting(residual))
     variance = float(gram[-1, -1]) / freedom / max(power, _TINY)
     if not white or power <= _TOLD * gram[-2, -2]:  # the difference of products is too small
         own = combined(problem, fit, shift, row)
-        power, along = max(float(own @ own), _TINY), float(own @ left)
-        variance = float(covariance(own[None], left, freedom=freedom, white=white)[0, 0])
+        power, along = max(float(own @ own), _TINY), float(own @ residual)
+        variance = float(covariance(own[None], residual, freedom=freedom, white=white)[0, 0])
+    others = np.delete(np.arange(len(gram)), -2)
     return HiddenPole(
         squared=along / power,
         std=float(np.sqrt(variance)),
         shift=shift,
         fit=fit,
-        halves=halves[:, told[:, None], told],
+        halves=halves[:, others[:, None], others],
     )
 
 
 def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
-    """Independent samples that one more pole's response sees in the noise; None in white noise.
+    """Independent samples for the response of one more pole, as tested; None in white noise.
 
-    Colour that lies elsewhere in the spectrum costs it none. The noise is what the fit with the
-    pole leaves: what the pole explains is no noise.
-
-    Parameters
-    ----------
-    problem : Problem
-        The data.
-    hidden : HiddenPole
-        What the test said of the pole.
-    richer : Fit
-        The fit that has it.
+    Colour elsewhere in the spectrum costs none. The noise is the residual of the `richer` fit,
+    since what the pole explains is not noise.
     """
     if hidden.halves is None:
         return None
-    left = problem.innovations(richer.prediction, richer.residual)
-    if is_white(problem.counting(left)):
+    residual = problem.innovations(richer.prediction, richer.residual)
+    if is_white(problem.counting(residual)):
         return None
     freedom = max(problem.counted - hidden.shift.size - 1, 1)
     own = combined(problem, hidden.fit, hidden.shift, response_to_square(problem, hidden.fit))
-    variance = float(covariance(own[None], left, freedom=freedom, white=False)[0, 0])
+    variance = float(covariance(own[None], residual, freedom=freedom, white=False)[0, 0])
     power = max(float(own @ own), _TINY)
-    if_white = float(left @ left) / freedom / power
+    if_white = float(residual @ residual) / freedom / power
     return float(problem.counted * if_white / max(variance, _TINY))
 
 
@@ -274,7 +251,7 @@ def response_to_square(problem: Problem, fit: Fit) -> Real:
     there = part_of(problem, richer, theta).driven(above)
     if fit.initial.size or not fit.prediction.size:
         here = part_of(problem, fit.structure, fit.theta).driven(fit.linear[:-1])
-    else:  # what was predicted, less what is beside the input
+    else:  # the prediction, less bias and drift
         here = fit.prediction - fit.linear[-1]
         if problem.nuisance is not None:
             here = here - fit.nuisance @ problem.nuisance
@@ -282,67 +259,59 @@ def response_to_square(problem: Problem, fit: Fit) -> Real:
 
 
 def scale_of(fit: Fit) -> float:
-    """Time in samples that a fit has: its poles', or its delay."""
+    """Characteristic time of a fit, in samples: geometric mean of its poles', or its delay."""
     order = fit.structure.order
-    if not order:
-        return max(fit.delay, 0.1)
-    return float(fit.denominator[fit.structure.order] ** (1.0 / order))
+    return float(fit.denominator[order] ** (1.0 / order)) if order else max(fit.delay, 0.1)
 
 
 def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
-    """Return a fit with the longest pole that the record does not exclude, the rest moved along.
+    """Return a fit with the slowest pole that the record does not exclude, the others adjusted.
 
     Parameters
     ----------
-    fit : Fit
-        Without it.
-    hidden : HiddenPole
-        What `hidden_pole` says of it.
+    fit, hidden : Fit, HiddenPole
+        The fit without it, and its test by `hidden_pole`.
     """
     moved = made_room(fit, hidden)
-    return replace(
-        moved,
-        structure=one_more_pole(fit.structure),
-        theta=with_pole(fit.structure, moved.theta, hidden.limit),
-    )
+    theta = with_pole(fit.structure, moved.theta, hidden.limit)
+    return replace(moved, structure=one_more_pole(fit.structure), theta=theta)
 
 
 def made_room(fit: Fit, hidden: HiddenPole) -> Fit:
-    """Return the fit to which that pole comes, still without it.
+    """Return the fit adjusted for that pole, but still without it.
 
     Parameters
     ----------
     fit, hidden
         As for `as_if_hidden`.
     """
-    moved = hidden.limit**2 * hidden.shift
-    moved[1 : fit.theta.size] = np.clip(moved[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
-    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
-    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
+    change = hidden.limit**2 * hidden.shift
+    change[1 : fit.theta.size] = np.clip(change[1 : fit.theta.size], -_FARTHEST, _FARTHEST)
+    theta, linear = _moved(fit, change)
     return replace(fit, theta=theta, linear=linear)
 
 
 def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:
-    """Return a fit with the longest zero that q below 0 may stand for, its delay longer by as much.
+    """Return a fit with the slowest zero that q below 0 may mean, its delay longer by as much.
 
     Parameters
     ----------
-    fit : Fit
-        Without it.
-    hidden : HiddenPole
-        What `hidden_pole` says of it.
+    fit, hidden
+        As for `as_if_hidden`.
     """
     lead = float(np.sqrt(max(-hidden.squared, 0.0) + HALF * hidden.std))
-    moved = -(lead**2) * hidden.shift
-    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + moved, [fit.theta.size])
-    theta[0] += lead
-    numerator = np.convolve(linear[:-1], [1.0, lead])
-    return replace(
-        fit,
-        structure=replace(fit.structure, zeros=fit.structure.zeros + 1),
-        theta=within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY),
-        linear=np.append(numerator, linear[-1]),
-    )
+    theta, linear = _moved(fit, -(lead**2) * hidden.shift, later=lead)
+    linear = np.append(np.convolve(linear[:-1], [1.0, lead]), linear[-1])
+    structure = replace(fit.structure, zeros=fit.structure.zeros + 1)
+    return replace(fit, structure=structure, theta=theta, linear=linear)
+
+
+def _moved(fit: Fit, change: Real, *, later: float = 0.0) -> tuple[Real, Real]:
+    """Theta, its time constants inside their bounds, and linear parameters of a moved fit."""
+    theta, linear = np.split(np.concatenate([fit.theta, fit.linear]) + change, [fit.theta.size])
+    theta[0] += later
+    theta = within_reach(fit.structure, theta, delays=(-np.inf, np.inf), samples=_ANY)
+    return theta, linear
 
 
 def grow(
@@ -355,7 +324,7 @@ def grow(
     white: Callable[[F], bool],
     otherwise: Callable[[F], float] = lambda _: np.inf,
 ) -> Growth[F]:
-    """Add poles to a fit as long as the likelihood pays for them.
+    """Add poles to a fit while the likelihood supports them.
 
     Parameters
     ----------
@@ -366,35 +335,35 @@ def grow(
     refit : callable
         Fits a structure from a start.
     count : callable
-        Independent samples that a tested pole sees, the fit that has it given.
+        Independent samples for a tested pole, given the fit that has it.
     names : tuple of str
-        Structures that may be chosen; of others a fit is a rival at most.
+        Structures that may be chosen; a fit of any other is a rival at most.
     white : callable
-        Whether a fit leaves white noise, as one of many poles must.
+        Whether a fit leaves white noise, which one with many poles must.
     otherwise : callable
-        Least objective of the fits that are no richer than a given one, under other assumptions
-        between the samples: a fit with one more pole must improve on these too.
+        Least objective of fits no richer than a given one, under other assumptions between the
+        samples: a fit with one more pole must improve on these too.
     """
     grown: list[F] = []
     while True:
         test = hidden(best)
         structure = best.fit.structure
-        if not test.is_asked_for or structure.order >= _MOST:
+        if not test.is_significant or structure.order >= _MOST:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         richer = one_more_pole(structure)
         starts = [float(np.sqrt(test.squared))]
-        if test.squared > DEVIATIONS * test.std:  # so far away the test's own figure may be far off
+        if test.squared > DEVIATIONS * test.std:  # so far off q = 0 the estimate may be poor
             starts.append(_PROBE * test.scale)
         tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
         found = min(tried, key=lambda f: f.fit.objective)
-        seen = count(test, found)
-        gain = seen * float(np.log(best.fit.objective / found.fit.objective))
+        samples = count(test, found)
+        gain = samples * float(np.log(best.fit.objective / found.fit.objective))
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
         sure = richer.order <= FEW_POLES or white(found)
-        gain = min(gain, seen * float(np.log(otherwise(best) / found.fit.objective)))
-        if gain < np.log(seen) or not may_be_chosen or not sure:
+        gain = min(gain, samples * float(np.log(otherwise(best) / found.fit.objective)))
+        if gain < np.log(samples) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
         grown.append(found)
         best = found

@@ -1,10 +1,10 @@
-"""Whether the two halves of a record tell the same model.
+"""Whether one model fits both halves of a record.
 
-At the optimum of the whole record the slope of its sum of squares is zero, but that of either half
-need not be. One step of Gauss-Newton on a half says by how much a model of its own would lower
-its sum of squares: the score test (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948), at the cost
-of a small matrix. A plant that warms up, a sweep whose second half is nonlinear, and a slipping
-coupling show here.
+At the optimum of the whole record the gradient of its sum of squares is zero, but that of a half
+need not be. One Gauss-Newton step on a half gives the reduction of its sum of squares by a model
+of its own: the score test (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948), at the cost of a small
+matrix. It detects a plant that warms up, a sweep with a nonlinear second half, and a slipping
+coupling.
 """
 
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ __all__ = ["Halves", "compare_halves", "halves_of", "products_of_halves"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Halves:
-    """How far the halves of a record part.
+    """How much the halves of a record differ.
 
     Parameters
     ----------
     probability : float
-        Chance of so much or more, were one model right for both and the noise white.
+        Chance of so large a difference if one model were right for both and the noise white.
     share : float
-        Of the residual's power, what models of their own would explain.
+        Share of the residual's power that a model for each half would explain.
     owed : float
-        The same, r.m.s. over that of the whole output. Not over a half's own: of a sweep one half
-        hardly moves, and friction is much of that and nothing of the record.
+        The same as an r.m.s. over that of the whole output. Not over a half's own: in one half of
+        a sweep the output hardly moves, and friction is much of that but little of the record.
     """
 
     probability: float
@@ -43,9 +43,9 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
     Parameters
     ----------
     halves : ndarray, shape (2, p + 1, p + 1)
-        Of each half, the products of the derivatives of the prediction and of the residual.
+        For each half, products of the derivatives of the prediction and of the residual.
     y : ndarray, shape (n,)
-        The output about its mean, weighed as the residual is; 0 where a sample does not count.
+        The output about its mean, weighted like the residual; 0 where a sample does not count.
     share : float
         Independent samples per sample.
 
@@ -67,7 +67,7 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
 
 
 def products_of_halves(rows: Real, residual: Real) -> Real:
-    """Products of rows, (..., p, n), and of residuals, (..., n), over either half of a record.
+    """Products of rows, (..., p, n), and residuals, (..., n), over either half of a record.
 
     Returns
     -------
@@ -85,9 +85,9 @@ def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
     Parameters
     ----------
     halves : ndarray, shape (2, k, p + 1, p + 1)
-        Of each half, the products of the derivatives of the predictions and of the residuals.
+        For each half, products of the derivatives of the predictions and of the residuals.
     samples : int
-        How many the record has.
+        Number of samples in the record.
     share : float
         Independent samples per sample.
     """
@@ -99,12 +99,14 @@ def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
         gram, slope = half[:, :p, :p], half[:, :p, p]
         scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), tiny))
         values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
-        seen = values > 1e-8 * values[:, -1:]
+        determined = values > 1e-8 * values[:, -1:]
         along = (vectors.transpose(0, 2, 1) @ (slope / scale)[:, :, None])[:, :, 0]
-        gained = np.sum(np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0), axis=1)
+        gained = np.sum(
+            np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1
+        )
         statistic += np.minimum(gained, half[:, p, p])
-        degrees += np.count_nonzero(seen, axis=1)
-    told = variance > 0
+        degrees += np.count_nonzero(determined, axis=1)
+    noisy = variance > 0
     free = np.maximum(degrees - p, 1)
-    chance = scipy.special.chdtrc(free, share * statistic / np.where(told, variance, 1.0))
-    return np.where(told, chance, 1.0), np.where(told, statistic, 0.0)
+    chance = scipy.special.chdtrc(free, share * statistic / np.where(noisy, variance, 1.0))
+    return np.where(noisy, chance, 1.0), np.where(noisy, statistic, 0.0)

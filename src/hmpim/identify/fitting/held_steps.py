@@ -1,9 +1,9 @@
-"""A held input that steps straight through to the output: the delay ends somewhere in one sample.
+"""A held input that steps straight through to the output: samples fix the delay to one sample.
 
-Where the numerator is of the denominator's degree, the output jumps with a held input. Then the
-part of a sample by which it is late and the numerator are one and the same to the samples, and the
-likelihood jumps from one whole sample to the next: the delay stays in the middle of its sample,
-the samples about it are tried one by one, and figures are read at both ends of the best one.
+If the numerator has the denominator's degree, the output jumps with a held input. Samples then do
+not distinguish a fraction of a sample of delay from a change of the numerator, and the likelihood
+jumps from one whole sample to the next. So the delay stays in the middle of its sample, the
+neighbouring samples are tried one by one, and figures are read at both ends of the best one.
 """
 
 from dataclasses import replace
@@ -18,21 +18,21 @@ from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 __all__ = ["at_ends", "kept_in_sample", "steps_through"]
 
 _EDGE = 0.01
-"""Share of a sample by which the delay stays inside it."""
+"""Least distance of the delay from the ends of its sample, in samples."""
 
 _FORGOTTEN = 1e-10
-"""Share of a state that is left after a part of a sample, below which it is not seen again."""
+"""Share of a state that remains after part of a sample, below which it is unobservable."""
 
 
 def steps_through(structure: Structure, *, held: bool) -> bool:
-    """Whether the output of dynamics jumps when a held input does."""
+    """Whether the output jumps when a held input does."""
     if not held or structure.sampled or structure.parallel or structure.integrators:
         return False
     return structure.order > 0 and structure.zeros == structure.order
 
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:
-    """The problem with the delay kept in the middle of the sample that it is in."""
+    """The problem with the delay fixed to the middle of its sample."""
     stated = problem.shortest_delay == problem.longest_delay
     if stated or not steps_through(structure, held=problem.source.degree == 0):
         return problem
@@ -44,14 +44,14 @@ def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Probl
 def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real, Real]]:
     """Parameters that give the same samples, the delay at the beginning and the end of its sample.
 
-    With y = C x + D u behind a delay of d + f samples, d whole, the state is that of the last step
-    of the input, 1 - f before: C e^{A (1 - f)} and D + C Γ(1 - f) are what the samples tell, Γ the
-    integral of e^{At} B, and from them follow C and D at any other f.
+    With y = C x + D u behind a delay of d + f samples, d whole, the input last stepped 1 - f before
+    a sample. The samples determine C e^{A (1 - f)} and D + C Γ(1 - f), with Γ the integral of
+    e^{At} B, and from these follow C and D at any other f.
 
     Parameters
     ----------
     structure : Structure
-        One of which `steps_through` is true.
+        One for which `steps_through` is true.
     theta : ndarray, shape (1 + order,)
         Delay in samples, parameters of the sections.
     linear : ndarray, shape (m + 1,)
@@ -66,12 +66,12 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
     whole = float(np.floor(theta[0]))
     rest = 1.0 - (theta[0] - whole)
     moved, fed = _steps(below, rest)
-    seen, at_once = reads @ moved, through + reads @ fed
+    observed, at_once = reads @ moved, through + reads @ fed
     found = []
     for share in (_EDGE, 1.0 - _EDGE):
         moved, fed = _steps(below, 1.0 - share)
-        # What is forgotten within the sample is read by nothing.
-        reads = np.linalg.lstsq(moved.T, seen, rcond=_FORGOTTEN)[0]
+        # A state that is forgotten within the sample is unobservable.
+        reads = np.linalg.lstsq(moved.T, observed, rcond=_FORGOTTEN)[0]
         through = at_once - float(reads @ fed)
         above = np.append(reads, 0.0) + through * below
         delayed = np.concatenate([[whole + share], theta[1:]])

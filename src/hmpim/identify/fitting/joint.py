@@ -1,20 +1,19 @@
-"""The joint fit: structure, and what the input does between samples, chosen by the data.
+"""The joint fit: the data choose the structure and the assumption between the samples.
 
-Each structure is fitted from starts that come from the data; the Bayesian information
-criterion (G. Schwarz, Annals of Statistics 6, 1978) chooses, with the number of samples
-counted down for a residual that is not white. The assumption between the samples is
-chosen by likelihood alone, since none costs a parameter. For an input that is smooth
-against the rate and a system that filters it, held, linear and band-limited differ
-by little more than half a sample of delay, which no likelihood sees; the input is then
-taken as band-limited, or as held if it mostly stands still and jumps, unless the record speaks
-clearly against it.
+Each structure is fitted from starts that come from the data. The Bayesian information criterion
+(G. Schwarz, Annals of Statistics 6, 1978) chooses, with fewer effective samples if the residual is
+not white. The assumption between the samples is chosen by likelihood alone, since none costs a
+parameter. If the input is smooth at this rate and the system filters it, held, linear and
+band-limited inputs differ by little more than half a sample of delay, which no likelihood detects.
+The input is then assumed band-limited, or held if it mostly stands still and jumps, unless the
+record clearly contradicts it.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import look_again
 from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import pruned
@@ -30,16 +29,10 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import (
-    Growth,
-    HiddenPole,
-    grow,
-    one_more_pole,
-    seen_by_pole,
-)
+from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, one_more_pole, seen_by_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import UNDENIED
@@ -52,18 +45,18 @@ from hmpim.record import BETWEEN, Intersample
 __all__ = ["chosen_of", "joint_fit"]
 
 _LOOKS = 2
-"""How often the samples that count are looked at again, once there is a structure."""
+"""How often the samples that count are reconsidered, once there is a structure."""
 
 
 def joint_fit(
-    u: NDArray[np.float64],
-    y: NDArray[np.float64],
+    u: Real,
+    y: Real,
     *,
-    valid: NDArray[np.bool_] | None = None,
-    known: NDArray[np.bool_] | None = None,
+    valid: Mask | None = None,
+    known: Mask | None = None,
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] = (*PLAIN, *RICH, *MODES, *INTEGRATING),
-    nuisance: NDArray[np.float64] | None = None,
+    nuisance: Real | None = None,
     growing: bool = True,
     shared: bool = False,
 ) -> JointFit:
@@ -76,17 +69,17 @@ def joint_fit(
     valid : ndarray of bool, shape (n,), optional
         Output samples that count; all if None.
     known : ndarray of bool, shape (n,), optional
-        Input samples that were measured, not filled in; what the output does until it has
-        forgotten the others does not count. All if None.
+        Input samples that were measured, not filled in. The output does not count until it has
+        forgotten filled-in samples. All if None.
     intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}, optional
-        What the input does between samples, or 'sampled' for software, whose structures are
-        filters; chosen by likelihood among the first three if None.
+        The input between samples, or 'sampled' for software, whose structures are filters; chosen
+        by likelihood among the first three if None.
     structures : tuple of str
-        Which to try.
+        Structures to try.
     nuisance : ndarray, shape (k, n), optional
-        Rows beside the bias that enter linearly, such as a drift's.
+        Rows, in addition to the bias, that enter linearly, such as a drift's.
     growing : bool
-        Whether it is asked for one more pole at the end, and what that leaves open.
+        Whether to test for further poles at the end.
     shared : bool
         Whether other inputs, whose fits are unfinished, move the output too: many poles need not
         leave white noise then.
@@ -129,7 +122,7 @@ def chosen_of(
 def settle(
     course: Course, trials: list[Trial], best: Trial, share: float, *, silent: bool = False
 ) -> JointFit:
-    """The chosen trial among all, and the data as they were weighed."""
+    """The chosen trial among all, and the data with their noise model."""
     weighed = course.data.problem(best.intersample, course.counted)
     return JointFit(
         problem=weighed.plain,
@@ -144,40 +137,33 @@ def settle(
     )
 
 
-def weigh_and_look_again(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[Trial], Trial, float]:
-    """Weigh all fits, and again where the best of them shows that other samples count."""
+def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
+    """Choose among all fits, and again where the best of them shows that other samples count."""
     course, trials, best, share = _weigh(course, fitted)
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
         rests = best.fit is course.settled
         again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known)
-        natural = best.intersample == "bandlimited"
-        finer = interpolated_for(course, best.fit) if natural else None
+        bandlimited = best.intersample == "bandlimited"
+        finer = interpolated_for(course, best.fit) if bandlimited else None
         if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
             break
-        again = seen if again is None else again
-        data = (finer or course).data
-        course = replace(course, counted=again, data=data.plain)
-        chosen = (best.intersample, best.fit.structure)
-        hopeful = [(best.intersample, best.fit)] + [
-            (mode, fit)
-            for mode, fit in fitted
-            if (mode, fit.structure) != chosen
-            and (fit.cost < TWICE**2 * best.fit.cost or fit.structure.name in PLAIN)
-        ]
-        fitted = refit_all(course.data, hopeful, again)
+        again = again or seen
+        course = replace(course, counted=again, data=(finer or course).data.plain)
+        chosen, most = (best.intersample, best.fit.structure), TWICE**2 * best.fit.cost
+        others = [(mode, fit) for mode, fit in fitted if (mode, fit.structure) != chosen]
+        others = [(m, f) for m, f in others if f.cost < most or f.structure.name in PLAIN]
+        fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
 
 
 def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
-    """Whether white noise is left by a fit that is not weighed by a colour.
+    """Whether the fit leaves white noise if it is refitted without a noise colour.
 
-    Where the fits that led to it had not arrived, that colour is a mode's, under which the mode's
-    free response is no more than noise.
+    If earlier fits were unfinished, the colour may be that of a mode, and hide the mode's free
+    response.
     """
     if not problem.is_coloured or problem.begins is None:
         return False
@@ -188,7 +174,7 @@ def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
 def ask_for_poles(
     joint: JointFit, course: Course, structures: tuple[StructureName, ...]
 ) -> JointFit:
-    """Add poles, and once more without a colour of the noise that the richer fit contradicts."""
+    """Add poles, again without noise colour if the richer fit contradicts it."""
     grown, data = grow_poles(joint, course, structures), course.data
     if grown.best is joint.best or data.noise is None:
         return grown
@@ -202,78 +188,61 @@ def ask_for_poles(
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
-    """Add poles that the likelihood pays for, and note what it leaves open.
+    """Add poles that the likelihood supports, and record what it leaves open.
 
-    Where a pole is missing, half a sample or a zero may stand in for it: the likeliest natural
-    trials without zeros and with them grow too, and one leads that has become the likelier.
+    Half a sample of delay, or a zero, may have replaced a missing pole: so poles are also added to
+    the likeliest natural trials without zeros and with them, and the likeliest result leads.
     """
     growth = _grown_from(joint, joint.best, course, structures)
-    led, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
+    leading, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
     for rival in _others_to_grow(joint, course.natural):
-        one = _grown_from(joint, rival, course, structures)
-        found += one.grown
-        if one.grown and one.grown[-1].criterion < led.criterion:
-            growth, led = one, one.grown[-1]
+        other = _grown_from(joint, rival, course, structures)
+        found += other.grown
+        if other.grown and other.grown[-1].criterion < leading.criterion:
+            growth, leading = other, other.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    if led is joint.best:
-        return joint
-    best = min(
-        [led, *_plainer_than(led, joint, course, structures)], key=lambda trial: trial.criterion
-    )
-    if best is not led:  # of one more pole beside it nothing is known
-        joint = replace(joint, rivals=(), hidden=None)
-    return _led_by(best, joint, course)
+    return joint if leading is joint.best else _with_leading(leading, joint, course, structures)
 
 
-def _plainer_than(
-    led: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> list[Trial]:
-    """What a grown trial is without what the record does not need of it.
+def _with_leading(
+    leading: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
+) -> JointFit:
+    """The joint fit with a grown trial as the best, polished and under each assumption.
 
-    The pole that is added may lead to where plainer structures had not begun.
+    The added pole may lead to new starts for plainer structures, one of which may be better still.
     """
-    problem = course.data.problem(led.intersample, course.counted)
+    mode = leading.intersample
+    problem = course.data.problem(mode, course.counted)
     count = problem.counted * joint.weighed_share
-    fits = [t.fit for t in joint.trials if t.intersample == led.intersample]
-    found = pruned(problem, fits, structures)
-    return [trial_of(led.intersample, fit, count) for fit in found]
-
-
-def _led_by(led: Trial, joint: JointFit, course: Course) -> JointFit:
-    """The joint fit with another best trial, polished, and that under the other assumptions."""
-    weighed = course.data.problem(led.intersample, course.counted)
-    fit = polished(weighed, led.fit)
-    count = weighed.counted * joint.weighed_share
-    best = trial_of(led.intersample, fit, count)
-    others = () if course.alone else (m for m in BETWEEN if m != best.intersample)
-    problems = {mode: course.data.problem(mode, course.counted) for mode in others}
-    moved = [
-        trial_of(mode, refit_between(problem, fit, best.intersample, mode), count)
-        for mode, problem in problems.items()
-    ]
-    trials = [*(trial for trial in joint.trials if trial is not led), *moved, best]
-    fresh = settle(course, trials, best, joint.effective_share)
+    fits = [t.fit for t in joint.trials if t.intersample == mode]
+    plainer = [trial_of(mode, fit, count) for fit in pruned(problem, fits, structures)]
+    chosen = min([leading, *plainer], key=lambda trial: trial.criterion)
+    fit = polished(problem, chosen.fit)
+    trials = [trial for trial in joint.trials if trial is not chosen]
+    for other in () if course.alone else BETWEEN:
+        if other != mode:
+            moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
+            trials.append(trial_of(other, moved, count))
+    best = trial_of(mode, fit, count)
+    fresh = settle(course, [*trials, best], best, joint.effective_share)
+    if chosen is not leading:  # it was not tested for one more pole
+        return fresh
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 
 
 def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
-    """The likeliest natural trials without zeros and with them, but for the best itself.
+    """The likeliest natural trials without zeros and with them, except the best itself.
 
-    Of a best one with zeros the one with a pole less: from its own start a fit with zeros may have
-    ended elsewhere.
+    If the best has zeros, instead of it the one with a pole fewer: a fit with zeros from its own
+    start may have ended elsewhere.
     """
-    hopeful = [
-        trial
-        for trial in joint.trials
-        if trial.intersample == natural
-        and trial.fit.objective < TWICE * joint.best.fit.objective
-        and trial.fit.structure.integrators == joint.best.fit.structure.integrators
-    ]
+    own, most = joint.best.fit.structure, TWICE * joint.best.fit.objective
+    hopeful = [t for t in joint.trials if t.intersample == natural and t.fit.objective < most]
+    hopeful = [t for t in hopeful if t.fit.structure.integrators == own.integrators]
     found = []
     for with_zeros in (False, True):
         alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
         if joint.best in alike:
-            own = joint.best.fit.structure
             alike = [t for t in alike if with_zeros and one_more_pole(t.fit.structure) == own]
         if alike:
             found.append(min(alike, key=lambda trial: trial.criterion))
@@ -283,46 +252,44 @@ def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
 def _grown_from(
     joint: JointFit, trial: Trial, course: Course, structures: tuple[StructureName, ...]
 ) -> Growth[Trial]:
-    """Where a trial ends that poles are added to."""
+    """Add poles to a trial."""
     problem = course.data.problem(trial.intersample, course.counted)
     count = problem.counted * joint.weighed_share
 
-    def seen(test: HiddenPole, richer: Trial) -> float:
-        # What still follows the input is no noise, and has no spectrum to count samples by.
+    def samples(test: HiddenPole, richer: Trial) -> float:
+        # A residual that follows the input is no noise, and its spectrum counts no samples.
         if follows(course.data, richer.fit):
             return count
         return seen_by_pole(problem, test, richer.fit) or count
 
-    def otherwise(one: Trial) -> float:
-        most = one.fit.structure.parameters
-        others = (t.fit for t in joint.trials if t.intersample != one.intersample)
+    def otherwise(given: Trial) -> float:
+        most = given.fit.structure.parameters
+        others = (t.fit for t in joint.trials if t.intersample != given.intersample)
         plain = [fit.objective for fit in others if fit.structure.parameters <= most]
         return min(plain, default=np.inf)
 
     return grow(
         trial,
-        hidden=lambda one: course.data.hidden_pole(problem, one.fit),
+        hidden=lambda tested: course.data.hidden_pole(problem, tested.fit),
         refit=lambda structure, theta: trial_of(
             trial.intersample, fit_structure(problem, structure, theta), count
         ),
-        count=seen,
+        count=samples,
         names=structures,
-        white=lambda one: one.fit.is_white,
+        white=lambda found: found.fit.is_white,
         otherwise=otherwise,
     )
 
 
-def give_up(course: Course, fitted: list[tuple[Intersample, Fit]]) -> JointFit:
-    """The plain fits, of an output that no model explains."""
+def give_up(course: Course, fitted: Fits) -> JointFit:
+    """The plain fits, for an output that no model explains."""
     share = min((fit for _, fit in fitted), key=lambda f: f.objective).share
     trials = [trial_of(mode, fit, course.problem.counted * share) for mode, fit in fitted]
     return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
-def _weigh(
-    course: Course, fitted: list[tuple[Intersample, Fit]]
-) -> tuple[Course, list[Trial], Trial, float]:
-    """Weigh all fits under one noise model: it, the trials, the best, independent samples each."""
+def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
+    """Compare all fits under one noise model; the course with it, trials, best, effective share."""
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)
     share = leading.share
@@ -337,9 +304,7 @@ def _weigh(
     return course, trials, best, share
 
 
-def _decide(
-    course: Course, fitted: list[tuple[Intersample, Fit]], share: float
-) -> tuple[list[Trial], Trial]:
+def _decide(course: Course, fitted: Fits, share: float) -> tuple[list[Trial], Trial]:
     """All trials, and the chosen one among them, polished."""
     count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]

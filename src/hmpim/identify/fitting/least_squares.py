@@ -1,4 +1,4 @@
-"""Least squares, where columns may differ by powers of ten and some say nothing."""
+"""Least squares, where columns may differ by powers of ten and some have no content."""
 
 import numpy as np
 import scipy
@@ -8,24 +8,20 @@ from hmpim.identify.arrays import Real
 __all__ = ["UNSEEN", "inverted", "solved", "solved_exactly", "without"]
 
 UNSEEN = 1e-13
-"""Share of the greatest eigenvalue below which the record does not see a direction."""
+"""Share of the greatest eigenvalue below which the record does not determine a direction."""
 
 _WELL = 1e-4
-"""Least element of a triangular factor down to which no direction is unseen."""
+"""Least element of a triangular factor down to which all directions are determined."""
 
 _EXACTLY = 1e-14
-"""The share that is not seen where no normal equations are made."""
+"""The same share without normal equations."""
 
 
 def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
-    """Least squares without normal equations, whose rounding is the square root of this one's.
+    """Least squares without normal equations, which would lose half of the digits.
 
-    Returns
-    -------
-    weights : ndarray, shape (k,)
-        Of `rows`, (k, n).
-    left : float
-        Sum of squares that they leave of `target`, (n,).
+    Returned are the weights, (k,), of `rows`, (k, n), and the sum of squares of the residual of
+    `target`, (n,).
     """
     scale = np.sqrt(np.maximum(np.sum(rows**2, axis=1), np.finfo(float).tiny))
     found = np.linalg.lstsq((rows / scale[:, None]).T, target, rcond=_EXACTLY)[0] / scale
@@ -34,9 +30,9 @@ def solved_exactly(rows: Real, target: Real) -> tuple[Real, float]:
 
 
 def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
-    """Solve normal equations, scaled to unit diagonal; directions without content stay 0.
+    """Solve normal equations, scaled to unit diagonal; undetermined directions stay 0.
 
-    `moment` has shape (k,), or (k, m) for as many right sides.
+    `moment` has shape (k,), or (k, m) for m right-hand sides.
     """
     diagonal = gram.diagonal()
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
@@ -48,18 +44,18 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
             factor, _ = scipy.linalg.lapack.dpotrf(scaled)
         found, _ = scipy.linalg.lapack.dpotrs(factor, (moment.T / scale).T)
         return np.asarray((found.T / scale).T)
-    # The routine of eigh, which takes as long to check its arguments.
+    # eigh calls the same routine, but takes as long again to check its arguments.
     values, vectors, info = scipy.linalg.lapack.dsyevd(scaled, lower=1)
     if info:
         raise np.linalg.LinAlgError("eigenvalues of the normal equations did not converge")
     keep = values > UNSEEN * values[-1]
-    seen = vectors[:, keep] / scale[:, None]
-    projected = (moment.T @ seen) / (values[keep] + damping)
-    return np.asarray(seen @ projected.T)
+    directions = vectors[:, keep] / scale[:, None]
+    projected = (moment.T @ directions) / (values[keep] + damping)
+    return np.asarray(directions @ projected.T)
 
 
 def inverted(gram: Real) -> Real:
-    """Inverse of normal equations, very large along a direction that is not seen.
+    """Inverse of normal equations, very large along an undetermined direction.
 
     Where they are not definite, each curvature counts by its absolute value.
     """
@@ -75,6 +71,5 @@ def without(rows: Real, others: Real) -> Real:
     """Project `others`, (k, n), out of `rows`, (p, n)."""
     scale = np.sqrt(np.maximum(np.sum(others**2, axis=1), np.finfo(float).tiny))
     q, r = np.linalg.qr((others / scale[:, None]).T)
-    told = np.abs(np.diag(r)) > np.sqrt(UNSEEN)
-    q = q[:, told]
+    q = q[:, np.abs(np.diag(r)) > np.sqrt(UNSEEN)]
     return np.asarray(rows - (rows @ q) @ q.T)

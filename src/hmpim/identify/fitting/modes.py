@@ -1,11 +1,12 @@
-"""Modes in parallel, grown one after the other from the peaks of what is left over.
+"""Modes in parallel, added one after the other at the peaks of the residual.
 
-The response is a sum of modes, Σ gₖ/Aₖ(s), behind a delay. Poles and delay held, the gains are
-linear; a wrong delay turns each mode, and may turn its sign. So the poles are found first, each
-mode free to turn by a residue of its own, g + hs for g (B. Gustavsen and A. Semlyen, IEEE Trans.
-Power Delivery 14, 1999, fit residues and move poles as well). At those poles one sum over the
-rough response tells the delays at which gains alone explain it, and from there all is moved
-together. One more mode is placed where of all natural frequencies it explains most of the rest.
+The response is a sum of modes, Σ gₖ/Aₖ(s), behind a delay. With poles and delay fixed, the gains
+are linear. A wrong delay turns the phase of each mode, and may turn its sign. So the poles are
+found first, with a free phase for each mode: g + hs instead of g (B. Gustavsen and A. Semlyen,
+IEEE Trans. Power Delivery 14, 1999, fit residues and move poles as well). For those poles one sum
+over the rough response gives the delays at which gains alone explain it, and from there all
+parameters move together. A further mode starts at the natural frequency where it explains most of
+the residual.
 """
 
 from dataclasses import replace
@@ -13,32 +14,32 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.fitting.data import Data
+from hmpim.identify.fitting.data import Data, refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.spectral import condensed, fitted_roughly, left_roughly
-from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.fitting.spectral import condensed, fitted_roughly, residual_of
+from hmpim.identify.fitting.start import RoughResponse, local_minima
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
 
 __all__ = ["grown_modes"]
 
 _DAMPING = (0.02, 0.06, 0.2)
-"""Damping ratios of the modes that are looked for."""
+"""Damping ratios tried for a new mode."""
 
 _FREQUENCIES = 200
-"""Natural frequencies that they are looked for at, over the band."""
+"""Natural frequencies tried for a new mode, over the band."""
 
 _DELAYS = 3
 """Delays to start from, the likeliest first."""
 
 _FINE = 0.3
-"""Steps of the delay turn the highest frequency by so much, in rad."""
+"""Phase of one step of the delay at the highest frequency, in rad."""
 
 _STEPS = 20
-"""Steps on the rough response each time that a mode is added."""
+"""Most steps on the rough response for each added mode."""
 
 _TASTE = 12
-"""Steps from each start before the best is followed to its end."""
+"""Steps from each start before the best is fitted to convergence."""
 
 
 def grown_modes(
@@ -50,24 +51,15 @@ def grown_modes(
     *,
     hopeless: float,
 ) -> list[Fit]:
-    """Fits of sections in parallel, as many as it takes to leave white noise.
+    """Fits of sections in parallel, as many as are needed to leave white noise.
 
-    They are grown on the rough response, at a delay that others come to, and if that leaves more
-    than noise once more at the delay that they come to themselves: at a wrong one some modes stand
-    for it. The samples are asked from the fewest modes on that come near the best of them.
+    Modes are added on the rough response, first at `delay`, that of other fits, and if these leave
+    more than noise again at their own delay: at a wrong delay some modes only make up for it. The
+    delay may be earlier by up to `memory`, both in samples. Samples are fitted from the fewest
+    modes on that come near the best.
 
-    Parameters
-    ----------
-    problem : Problem
-        The data.
-    data : Data
-        Whose rough response they are grown on.
-    delay, memory : float
-        Delay to grow them at, and how much earlier it may be, in samples.
-    structures : list of Structure
-        Those that may be chosen, each of so many sections of order 2.
-    hopeless : float
-        Sum of squares from which on none is of use.
+    `structures` are those that may be chosen, each a number of sections of order 2. No fit with a
+    sum of squares of `hopeless` or more is of use.
     """
     rough = condensed(data.rough)
     found: dict[Structure, Fit] = {}
@@ -75,15 +67,15 @@ def grown_modes(
         before = np.inf
         for structure, start in _grown(rough, delay, memory, structures, known=known).items():
             fit = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
-            found[structure] = min(fit, found.get(structure, fit), key=lambda one: one.objective)
+            found[structure] = min(fit, found.get(structure, fit), key=lambda f: f.objective)
             if fit.is_white or fit.objective > (1.0 - PART) * before:
                 break
             before = fit.objective
-        best = min(found.values(), key=lambda one: one.objective, default=None)
+        best = min(found.values(), key=lambda f: f.objective, default=None)
         if best is None or best.objective > TWICE * hopeless:
             break
         if not best.converged:
-            best = found[best.structure] = fit_structure(problem, best.structure, best.theta)
+            best = found[best.structure] = refit(problem, best)
         if best.is_white:
             return [*found.values(), *_with_fewer(problem, rough, best, structures)]
         delay = best.delay
@@ -93,9 +85,9 @@ def grown_modes(
 def _with_fewer(
     problem: Problem, rough: RoughResponse, fit: Fit, structures: list[Structure]
 ) -> list[Fit]:
-    """Fits with a section less each time, the one that is missed least, while they leave noise.
+    """Remove the least important section, one after the other, while white noise remains.
 
-    Sections that were grown one by one may need one more to make up for where they ended.
+    Modes added one by one may need an extra one to make up for local minima.
     """
     named = {len(structure.sections): structure for structure in structures}
     found: list[Fit] = []
@@ -103,7 +95,7 @@ def _with_fewer(
         sections = fit.theta[1:].reshape(-1, 2)
         plainer = named[len(sections) - 1]
         without = [np.delete(sections, k, axis=0).ravel() for k in range(len(sections))]
-        starts = np.stack([np.append(fit.delay, one) for one in without])
+        starts = np.stack([np.append(fit.delay, others) for others in without])
         start = fitted_roughly(rough, plainer, starts, steps=_STEPS).likely[0]
         fit = fit_structure(problem, plainer, start)
         found.append(fit)
@@ -113,20 +105,20 @@ def _with_fewer(
 def _grown(
     rough: RoughResponse, delay: float, memory: float, structures: list[Structure], *, known: bool
 ) -> dict[Structure, Real]:
-    """Parameters with more sections each time, from the fewest on that come near the best.
+    """Parameters with one more section each time, from the fewest on that come near the best.
 
-    One more is added while it explains a good part of what is left, at a delay that is held: free
-    to turn, or each with a gain alone where the delay is known.
+    Sections are added while each explains a good part of the residual, at a fixed delay: with a
+    free phase, or with only a gain each if the delay is `known`.
     """
     named = {len(structure.sections): structure for structure in structures}
     found: dict[Structure, tuple[float, Real]] = {}
-    theta, left, least = np.array([delay]), rough, np.inf
+    theta, residual, least = np.array([delay]), rough, np.inf
     for count in range(1, max(named) + 1):
         sections = (2,) * count
         free = replace(structures[0], sections=sections, zeros=2 * count - 1, parallel=True)
         gains = named.get(count, replace(free, zeros=2 * count - 2))
         shape = gains if known else free
-        theta = np.concatenate([theta, _peak(left)])
+        theta = np.concatenate([theta, _peak(residual)])
         leading = fitted_roughly(rough, shape, theta[None], held=True, steps=_STEPS)
         poles = leading.likely[0][1:]
         late = [] if known else _delays(rough, poles, memory)
@@ -140,9 +132,9 @@ def _grown(
         if not known and fit.error < TWICE * leading.error:
             leading, shape = fit, gains
         theta, least = leading.likely[0], error
-        left = left_roughly(rough, shape, theta)
+        residual = residual_of(rough, shape, theta)
     least = min((error for error, _ in found.values()), default=0.0)
-    return {one: theta for one, (error, theta) in found.items() if PART**2 * error <= least}
+    return {s: theta for s, (error, theta) in found.items() if PART**2 * error <= least}
 
 
 def _shapes(omega: Real, theta: Real) -> Complex:
@@ -161,9 +153,9 @@ def _peak(rough: RoughResponse) -> Real:
         theta = np.stack([np.log(2 * damping / natural), np.full(natural.size, 0.25 / damping**2)])
         shapes = _shapes(omega, theta.T.ravel())
         along = np.abs(shapes.conj() @ (weight * rough.response)) ** 2
-        told = along / (np.abs(shapes) ** 2 @ weight)
-        if told.max() > best:
-            best, found = float(told.max()), theta[:, np.argmax(told)]
+        explained = along / (np.abs(shapes) ** 2 @ weight)
+        if explained.max() > best:
+            best, found = float(explained.max()), theta[:, np.argmax(explained)]
     return found
 
 
@@ -177,14 +169,12 @@ def _delays(rough: RoughResponse, theta: Real, memory: float) -> list[float]:
     weighted = shapes.conj() * rough.weight
     step = _FINE / omega[-1]
     shifts = np.arange(max(rough.earliest - rough.lag, -memory), 2.0 + step, step)
-    # Every turn is a product of one of few large ones and one of few small ones.
+    # Every shift is the sum of one of few large ones and one of few small ones.
     few = int(np.ceil(np.sqrt(shifts.size)))
     large = np.exp(1j * np.outer(shifts[::few], omega))
     small = np.exp(1j * np.outer(shifts[:few] - shifts[0], omega)).conj().view(np.float64)
     along = (weighted * rough.response)[:, None, :] * large
     cross = (along.view(np.float64) @ small.T).reshape(len(along), -1)[:, : shifts.size]
     gains = np.linalg.lstsq((weighted @ shapes.T).real, cross, rcond=None)[0]
-    told = np.concatenate([[-np.inf], np.sum(cross * gains, axis=0), [-np.inf]])
-    tops = np.flatnonzero((told[1:-1] >= told[:-2]) & (told[1:-1] >= told[2:]))
-    likeliest = tops[np.argsort(-told[1:-1][tops])][:_DELAYS]
+    likeliest = local_minima(-np.sum(cross * gains, axis=0), _DELAYS)
     return [float(rough.lag + shifts[i]) for i in likeliest]

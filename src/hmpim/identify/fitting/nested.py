@@ -1,7 +1,7 @@
-"""First order or second: the bars of a second-order fit, widened until they admit the first.
+"""First order or second: error bars of a second-order fit, widened until they admit first order.
 
-A second pole much faster than the first looks like delay (`hmpim.identify.fitting.growth`): the
-record sees q = T₂², so that a bar made from the curvature in T₂ is too short as soon as q is within
+A second pole much faster than the first looks like delay (`hmpim.identify.fitting.growth`). The
+record determines q = T₂², so an error bar from the curvature in T₂ is too short when q is within
 a few of its own errors of 0.
 """
 
@@ -9,24 +9,25 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import EXCLUDED
-from hmpim.identify.fitting.fit import Fit, fit_structure
+from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.model.dynamics import STRUCTURES
 
-__all__ = ["stretched", "widened"]
+__all__ = ["widened"]
 
 
 def widened(joint: JointFit, cov: Real) -> Real:
     """Widen the covariance of a second-order fit until it admits the first-order one.
 
-    By the likelihood ratio the best first-order model lies √Δ standard deviations away, Δ the
-    deviance between them. Where `cov` puts it farther, it is widened along the line between the
-    two: cov + d dᵀ (1/Δ - 1/D), with d the difference of the parameters and D = dᵀ cov⁻¹ d.
+    By the likelihood ratio the best first-order model is √Δ standard deviations away, Δ the
+    deviance between them, at least 1. If it is farther by `cov`, that is widened along the line
+    between the two: cov + d dᵀ (1/Δ - 1/D), with d the difference of the parameters and
+    D = dᵀ cov⁻¹ d.
 
     Parameters
     ----------
     joint : JointFit
-        The fit; anything but a second-order one is left as it is.
+        The fit. If it is not of second order, `cov` is returned.
     cov : ndarray, shape (p, p)
         Of theta and the linear parameters.
 
@@ -34,39 +35,17 @@ def widened(joint: JointFit, cov: Real) -> Real:
     -------
     ndarray, shape (p, p)
     """
-    fit, problem = joint.best.fit, joint.weighed
-    simple = next(
-        (
-            trial.fit
-            for trial in joint.trials
-            if trial.fit.structure.name == "first_order"
-            and trial.intersample == joint.best.intersample
-        ),
-        None,
-    )
+    fit = joint.best.fit
+    alike = (t.fit for t in joint.trials if t.intersample == joint.best.intersample)
+    simple = next((other for other in alike if other.structure.name == "first_order"), None)
     if fit.structure.name != "second_order" or simple is None or not np.isfinite(cov).all():
         return cov
     if _deviance(simple, joint) > 2 * EXCLUDED:
         return cov
-    simple = fit_structure(problem, STRUCTURES["first_order"], simple.theta)
+    simple = refit(joint.weighed, simple)
     deviance = _deviance(simple, joint)
     if deviance > EXCLUDED:
         return cov
-    return stretched(cov, simple, fit, deviance)
-
-
-def stretched(cov: Real, simple: Fit, fit: Fit, deviance: float) -> Real:
-    """Widen the covariance of a second-order fit until a first-order one lies √deviance away.
-
-    Parameters
-    ----------
-    cov : ndarray, shape (p, p)
-        Of theta and the linear parameters.
-    simple, fit : Fit
-        Of first and of second order.
-    deviance : float
-        Twice the difference of their log-likelihoods; at least 1 is taken.
-    """
     deviance = max(deviance, 1.0)
     there = np.concatenate([simple.theta, [0.0], simple.linear])
     apart = there - np.concatenate([fit.theta, fit.linear])

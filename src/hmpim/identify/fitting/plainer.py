@@ -1,10 +1,11 @@
-"""Plainer structures from where a richer one ended, and in place of one that is not linear."""
+"""Plainer structures: started from a richer fit, and in place of a nonlinear one."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -18,7 +19,7 @@ _PRECISION = 1e-4
 
 
 def plainer(joint: JointFit) -> Fit | None:
-    """Best fit of a plain structure, refined; None if the chosen one is plain, or none is near.
+    """Best fit of a plain structure, refined; None if the chosen one is plain, or none was tried.
 
     Parameters
     ----------
@@ -29,47 +30,36 @@ def plainer(joint: JointFit) -> Fit | None:
     if best.fit.structure.name in PLAIN:
         return None
     rivals = [trial for trial in joint.trials if trial.fit.structure.name in PLAIN]
-    # Under another assumption between the samples it is a start as good.
+    # A fit under another assumption between the samples is as good a start.
     rivals = [r for r in rivals if r.intersample == best.intersample] or rivals
     if not rivals:
         return None
     plain = min(rivals, key=lambda trial: trial.criterion).fit
-    return fit_structure(joint.problem, plain.structure, plain.theta, precision=_PRECISION)
+    return refit(joint.problem, plain, precision=_PRECISION)
 
 
 def taking(joint: JointFit, fit: Fit) -> JointFit:
-    """Take another fit than the one chosen, of a structure that was tried.
+    """Replace the chosen fit by another one, of a structure that was tried.
 
     Parameters
     ----------
-    joint : JointFit
-        From `joint_fit`.
-    fit : Fit
-        To the same data; the chosen one itself leaves all as it is.
+    joint, fit : JointFit, Fit
+        From `joint_fit`, and a fit to the same data; nothing changes if it is the chosen one.
     """
     if fit is joint.best.fit:
         return joint
-    mode = joint.best.intersample
+    mode, name = joint.best.intersample, fit.structure.name
     best = trial_of(mode, fit, joint.problem.counted * joint.effective_share)
-    others = [
-        trial
-        for trial in joint.trials
-        if (trial.fit.structure.name, trial.intersample) != (fit.structure.name, mode)
-    ]
+    others = [t for t in joint.trials if (t.fit.structure.name, t.intersample) != (name, mode)]
     return replace(
-        joint,
-        best=best,
-        trials=(*others, best),
-        effective_share=fit.share,
-        rivals=(),
-        hidden=None,
+        joint, best=best, trials=(*others, best), effective_share=fit.share, rivals=(), hidden=None
     )
 
 
 def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
-    """Fits of plain structures, also tried from what the best of the richer ones has found.
+    """Fits of plain structures, also from starts that the best of the richer ones provides.
 
-    One section of it is kept; what the others add at low frequencies is delay.
+    Each start keeps one of its sections; the others count as delay.
     """
     best = min(richer, key=lambda f: f.objective)
     sections = _sections(best)
@@ -81,16 +71,10 @@ def reduced(problem: Problem, fits: list[Fit], richer: list[Fit]) -> list[Fit]:
     def better(fit: Fit) -> Fit:
         if fit.objective <= TWICE * best.objective:
             return fit
-        tried = [
-            fit_structure(
-                problem,
-                fit.structure,
-                np.concatenate([[late - c[0]], theta]),
-                hopeless=fit.objective,
-            )
-            for theta, c in sections
-            if fit.structure.sections == (c.size,)
-        ]
+        own = [(theta, c) for theta, c in sections if fit.structure.sections == (c.size,)]
+        starts = [np.append(late - c[0], theta) for theta, c in own]
+        limit = fit.objective
+        tried = [fit_structure(problem, fit.structure, t, hopeless=limit) for t in starts]
         return min([fit, *tried], key=lambda f: f.objective)
 
     return [better(fit) for fit in fits]

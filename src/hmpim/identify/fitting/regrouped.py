@@ -1,9 +1,9 @@
 """Real poles that meet in two sections of a structure, grouped anew.
 
-A pole of one section and a pole of another are exchanged without a change of the model. Where two
-of them meet the cost is level across their difference d, for it depends on d² alone: no way leads
-from there to the complex pair (d² < 0), which may be likelier, and the errors to first order are
-boundless. As the two poles of one section they have that way, and finite errors.
+Exchanging a pole of one section with a pole of another does not change the model. So the cost
+depends only on the square of their difference d, and is stationary where they meet: no descent
+leads to a complex pair (d² < 0), which may be likelier, and the errors to first order are
+infinite. As the two poles of one section they can become a pair, and have finite errors.
 """
 
 import itertools
@@ -19,25 +19,16 @@ __all__ = ["regrouped"]
 
 
 class _Pole(NamedTuple):
-    """Time constant of a real pole, and which section it is in."""
+    """Time constant of a real pole, and its section."""
 
     lag: float
     section: int
 
 
 def regrouped(structure: Structure, theta: Real) -> Real | None:
-    """Parameters of the same model, two real poles that have met now the pair of one section.
+    """Parameters, (1 + order,), of the same model with two poles that have met in one section.
 
-    Parameters
-    ----------
-    structure : Structure
-        A chain of sections; of modes side by side each has a gain of its own.
-    theta : ndarray, shape (1 + order,)
-        Its parameters.
-
-    Returns
-    -------
-    ndarray, shape (1 + order,), or None where none have met
+    None if no poles have met, or for modes in parallel, of which each has a gain of its own.
 
     Examples
     --------
@@ -51,21 +42,21 @@ def regrouped(structure: Structure, theta: Real) -> Real | None:
         return None
     real, coefficients = _real_poles(structure, theta)
     apart = [
-        (abs(np.log(one.lag / other.lag)), one, other)
-        for one, other in itertools.combinations(real, 2)
-        if one.section != other.section
+        (abs(np.log(first.lag / second.lag)), first, second)
+        for first, second in itertools.combinations(real, 2)
+        if first.section != second.section
     ]
     if not apart:
         return None
-    distance, one, other = min(apart)
+    distance, first, second = min(apart)
     if distance > PART:
         return None
-    into, out = sorted((one.section, other.section), key=lambda k: -structure.sections[k])
+    into, out = sorted((first.section, second.section), key=lambda k: -structure.sections[k])
     free = [pole.lag for pole in real if pole.section in (into, out)]
-    free = [lag for lag in free if lag not in (one.lag, other.lag)]
+    free = [lag for lag in free if lag not in (first.lag, second.lag)]
     if len(free) != structure.sections[out] or structure.sections[into] != 2:
         return None
-    coefficients[into] = [one.lag + other.lag, one.lag * other.lag]
+    coefficients[into] = [first.lag + second.lag, first.lag * second.lag]
     coefficients[out] = [sum(free), float(np.prod(free))][: len(free)]
     return np.append(theta[0], theta_of(structure, np.concatenate(coefficients)))
 
@@ -81,7 +72,7 @@ def _real_poles(structure: Structure, theta: Real) -> tuple[list[_Pole], list[li
         if order == 1:
             found.append(_Pole(own[0], k))
         elif within >= 0.0:
-            sides = (own[0] + np.sqrt(within)) / 2, (own[0] - np.sqrt(within)) / 2
-            found += [_Pole(float(lag), k) for lag in sides if lag > 0.0]
+            lags = (own[0] + np.sqrt(within)) / 2, (own[0] - np.sqrt(within)) / 2
+            found += [_Pole(float(lag), k) for lag in lags if lag > 0.0]
         start += order
     return found, coefficients

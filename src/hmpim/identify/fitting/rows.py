@@ -1,8 +1,8 @@
 """The rows of one problem: what each linear parameter multiplies, and the derivatives.
 
 The output is a sum of rows: for each input, B(s)/A(s) behind a delay, one row for each
-coefficient of B; the bias; whatever else is linear, such as a drift; and, where a record does not
-begin at rest, the free response of the state it begins with.
+coefficient of B; the bias; any other linear terms, such as a drift; and, if the record does not
+begin at rest, the free responses of the initial state.
 """
 
 from collections.abc import Iterator
@@ -23,21 +23,20 @@ from hmpim.model.sampled import SAMPLES_ALONE, SampledInput
 __all__ = ["STAMPED_LATE", "Driven", "Part", "Problem", "spans"]
 
 STAMPED_LATE = -4.0
-"""Least delay in samples that is tried where an output follows its input: stamps may be late."""
-
+"""Least delay in samples for an output that follows its input: time stamps may be late."""
 
 _FINAL = 1e-6
 """Precision of the chosen fit, see `hmpim.identify.fitting.fit.fit_structure`."""
 
 _STRETCH = 65_536
-"""Samples that are computed at once: as many as fit into a processor's cache."""
+"""Samples computed at once: as many as fit into a processor's cache."""
 
 _NOTHING = 50.0
 """Time constants after which a free response is less than rounding."""
 
 
 def spans(first: int, last: int) -> Iterator[slice]:
-    """Return the samples from `first` to `last` in spans that fit into a processor's cache."""
+    """The samples from `first` to `last` in spans that fit into a processor's cache."""
     for start in range(first, last, _STRETCH):
         yield slice(start, min(start + _STRETCH, last))
 
@@ -59,19 +58,19 @@ class Problem:
     shortest_delay : float
         Least delay to try, in samples; below 0 the output is ahead, or its stamps are late.
     whitening : ndarray, shape (n // 2 + 1,), or None
-        Gain at each bin of the transform after which the noise is white; residuals and
-        derivatives then are those of the whitened output. None for noise that is white.
+        Gain at each bin of the transform that makes the noise white; residuals and derivatives
+        are then those of the whitened output. None for white noise.
     noise : ndarray, shape (order + 1,), or None
-        Autoregression of the noise, 1 first: what it leaves of residual and derivatives is white.
+        Autoregression of the noise, 1 first, by which residual and derivatives are whitened.
     told : ndarray of bool, shape (n,), or None
-        With `noise`, the samples whose whole past, as far as it reaches, counts.
+        With `noise`, the samples that count together with all earlier ones the filter uses.
     level : ndarray, shape (n,), or None
-        With `noise`, how loud what the autoregression leaves is at each sample, over its geometric
-        mean: whitened samples are divided by it. None for noise of one level.
+        With `noise`, the level of the whitened noise at each sample, over its geometric mean:
+        whitened samples are divided by it. None for a constant level.
     nuisance : ndarray, shape (k, n), or None
-        Rows beside the bias that enter linearly, such as a drift's.
+        Rows, in addition to the bias, that enter linearly, such as a drift's.
     begins : int or None
-        Sample from which on the free response of an unknown state is fitted; those before do not
+        Sample from which the free response of an unknown state is fitted; earlier ones do not
         count. None for a record that begins at rest.
     """
 
@@ -100,12 +99,12 @@ class Problem:
 
     @property
     def plain(self) -> "Problem":
-        """The same, its noise taken for white."""
+        """The same with noise assumed white."""
         return replace(self, noise=None, told=None, level=None)
 
     @property
     def counts(self) -> Mask | None:
-        """Samples whose residual, whitened where noise is, counts; None when all do."""
+        """Samples whose residual, whitened if necessary, counts; None when all do."""
         return self.valid if self.told is None else self.told
 
     def counting(self, values: Real) -> Real:
@@ -114,18 +113,18 @@ class Problem:
 
     @property
     def filtered(self) -> bool:
-        """Whether samples are whitened, so that none counts by itself."""
+        """Whether samples are whitened, so that a span of them cannot be computed alone."""
         return self.noise is not None or self.whitening is not None
 
     @property
     def is_coloured(self) -> bool:
-        """Whether an autoregression whitens the samples; noise of another level is white."""
+        """Whether an autoregression whitens the samples; noise of changing level alone is white."""
         return self.noise is not None and self.noise.size > 1
 
     def stretches(self, first: int, last: int) -> Iterator[slice]:
-        """Return the samples from `first` to `last` in spans, to be computed one after the other.
+        """The samples from `first` to `last` in spans, to be computed one after the other.
 
-        One span where samples are whitened, or where a filter in z needs the whole record.
+        A single span if samples are whitened, or if a filter in z needs the whole record.
         """
         if self.filtered or self.source.degree == SAMPLES_ALONE:
             return iter([slice(first, last)])
@@ -145,15 +144,15 @@ class Problem:
         return np.asarray(scipy.fft.irfft(scipy.fft.rfft(counted) * self.whitening, rows.shape[-1]))
 
     def innovations(self, prediction: Real, residual: Real) -> Real:
-        """What of the output no past residual foresees; the residual itself of white noise."""
+        """The part of the residual that its past does not predict; all of it for white noise."""
         return residual if self.noise is None else self.masked(self.y - prediction)
 
     def as_loud(self, innovations: Real) -> Real:
-        """Return innovations, (n,), as loud as they are in the record."""
+        """Innovations, (n,), with the level that they have in the record."""
         return innovations if self.level is None else innovations * self.level
 
     def coloured(self, noise: Real, level: Real | None = None) -> "Problem":
-        """The same with an autoregression for the noise; after a gap it starts anew."""
+        """The same with an autoregression for the noise, started anew after a gap."""
         order, size = noise.size - 1, self.y.size
         lost = np.zeros(size, dtype=np.int64) if self.valid is None else np.cumsum(~self.valid)
         before = np.concatenate([np.zeros(order + 1, dtype=np.int64), lost])[:size]
@@ -167,31 +166,27 @@ class Problem:
 
 
 class Driven:
-    """Responses that the numerator's coefficients multiply, and the level beside them.
+    """Responses to the input, `rows`, (m, n), one for each coefficient of the numerator.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (m, n)
-        One response for each coefficient, `level` not added.
-    level : float
-        What the scale factor multiplies at every sample: beside a bias, all but the same row.
+    `level` is a constant that the scale factor multiplies in addition. As part of a row it would
+    make that nearly collinear with the bias.
     """
 
     rows: Real
     level: float
 
     def driven(self, numerator: Real) -> Real:
-        """What the input does, (n,), with `numerator`, (m,), before its `rows`."""
+        """Response to the input, (n,), for the numerator's coefficients, (m,)."""
         return np.asarray(numerator @ self.rows + numerator[0] * self.level)
 
 
 class Part(Driven):
-    """What one input does to the output at given parameters.
+    """Response of the output to one input at given parameters.
 
     Parameters
     ----------
     problem : Problem
-        Its source, and where it begins.
+        The input, and the sample at which free responses begin.
     structure : Structure
         The dynamics.
     theta : ndarray, shape (1 + order,)
@@ -213,7 +208,7 @@ class Part(Driven):
         self._begin(problem.begins)
 
     def begun(self, begins: int | None) -> "Part":
-        """The same where the free responses begin elsewhere."""
+        """The same with free responses that begin at another sample."""
         if begins == self._begins:
             return self
         other = copy(self)
@@ -237,16 +232,16 @@ class Part(Driven):
         self.free[:, self._lasts] = weights @ self._since_start
 
     def slopes(self, numerator: Real, initial: Real, here: slice = slice(None)) -> Real:
-        """Derivatives of what the input does by theta, shape (1 + order, n).
+        """Derivatives of the response by theta, shape (1 + order, n).
 
         Parameters
         ----------
         numerator : ndarray, shape (m,)
-            What multiplies `rows`.
+            Weights of `rows`.
         initial : ndarray, shape (order,) or (0,)
-            What multiplies `free`.
+            Weights of `free`.
         here : slice
-            Samples that are asked for, instead of all n.
+            Requested samples, instead of all n.
         """
         structure = self.structure
         full: Real = numerator @ self._numerators
@@ -265,7 +260,7 @@ class Part(Driven):
         return out
 
     def _added(self, expansion: Expansion, here: slice = slice(None)) -> Real:
-        """Sum of single poles, the input itself and its rate."""
+        """Sum of the responses of single poles, the input itself and its rate."""
         direct, rate = expansion.direct, expansion.rate
         return self._answers.summed(
             expansion.simple,
@@ -276,7 +271,7 @@ class Part(Driven):
         )
 
     def _parts(self, each: Complex) -> Real:
-        """Values of each pole, (k, m): real parts, then imaginary ones where a pole has one."""
+        """Values of each pole, (k, m): real parts, then imaginary ones of complex poles."""
         return np.concatenate([each.real, each.imag[self._poles.upper.imag != 0.0]])
 
     def _freely(self, weights: Complex) -> Real:
@@ -284,16 +279,15 @@ class Part(Driven):
         return self._parts(weights.conj().T).T
 
     def _since(self) -> Real:
+        """Time since the delayed start of the record, in samples, (n,)."""
         return np.asarray(np.maximum(np.arange(self._source.samples) - self._delay, 0.0))
 
 
 def _powers(structure: Structure) -> Real:
-    """Numerators 1, s, s², … that a structure has, by rising powers, shape (m, zeros + 1).
+    """Numerators 1, s, s², … of a structure, by rising powers, shape (m, zeros + 1).
 
-    Of sections in parallel, as `Parallel` has them: the first alone, and each other less the first.
+    For sections in parallel, as in `Parallel`: the first alone, and each other less the first.
     """
-    if structure.parallel and structure.zeros == structure.order - 1:
-        return np.eye(structure.order)
     if structure.parallel:
         gains = np.zeros((len(structure.sections), structure.order))
         gains[:, ::2] = np.eye(len(structure.sections))

@@ -1,4 +1,4 @@
-"""The rows of software under test: what a filter in z makes of the samples, and the derivatives."""
+"""The rows of software under test: responses of a filter in z, and their derivatives."""
 
 import numpy as np
 import scipy
@@ -12,17 +12,16 @@ from hmpim.model.sampled import MARGIN, SAMPLES_ALONE
 
 __all__ = ["SampledPart", "part_of"]
 
-
 _STEP = 1e-6
 
 
 class SampledPart(Driven):
-    """What software makes of its input at given parameters; the same face as `Part`.
+    """Response of software to its input at given parameters; the same interface as `Part`.
 
     Parameters
     ----------
     problem : Problem
-        Its source, and where it begins.
+        The input, and the sample at which free responses begin.
     structure : Structure
         One of `hmpim.model.dynamics.FILTERS`.
     theta : ndarray, shape (1 + order,)
@@ -36,9 +35,8 @@ class SampledPart(Driven):
         deviation = source.coefficients[MARGIN : MARGIN + n]
         moved = np.concatenate([np.zeros(late), deviation])[:n]
         self._below = _below(structure, theta[1:])
-        rows = [
-            scipy.signal.lfilter(self._below.sum() * nyquist_taps(structure), self._below, moved)
-        ]
+        taps = self._below.sum() * nyquist_taps(structure)
+        rows = [scipy.signal.lfilter(taps, self._below, moved)]
         for _ in range(structure.zeros):
             rows.append(np.diff(rows[-1], prepend=0.0))
         self.rows = np.stack(rows)
@@ -46,13 +44,11 @@ class SampledPart(Driven):
         self.free = np.empty((0, n))
         """Free responses, shape (order, n)."""
         if problem.begins is not None and structure.order:
-            blows = np.zeros((structure.order, n))
-            for k in range(min(structure.order, n - problem.begins)):
-                blows[k, problem.begins + k] = 1.0
-            self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, blows))
+            impulses = np.eye(structure.order, n, problem.begins)
+            self.free = np.asarray(scipy.signal.lfilter(np.ones(1), self._below, impulses))
 
     def slopes(self, numerator: Real, initial: Real, here: slice = slice(None)) -> Real:
-        """Derivatives by theta, shape (1 + order, n); a whole number of samples has none."""
+        """Derivatives by theta, shape (1 + order, n); 0 by the delay, a whole number of samples."""
         order = self.structure.order
         out = np.zeros((1 + order, self.rows.shape[1]))
         if not order:
@@ -60,16 +56,9 @@ class SampledPart(Driven):
         forced = numerator @ self.rows
         free = initial @ self.free if initial.size else np.zeros(forced.size)
         turned = -scipy.signal.lfilter(np.ones(1), self._below, forced + free)
-        by_coefficient = np.stack(
-            [
-                forced / self._below.sum()
-                + np.concatenate([np.zeros(k), turned[: turned.size - k]])
-                for k in range(1, order + 1)
-            ]
-        )
-        for j in range(order):
-            step = np.zeros(order)
-            step[j] = _STEP
+        later = [np.concatenate([np.zeros(k), turned[:-k]]) for k in range(1, order + 1)]
+        by_coefficient = forced / self._below.sum() + np.stack(later)
+        for j, step in enumerate(_STEP * np.eye(order)):
             up = _below(self.structure, self.theta[1:] + step)
             down = _below(self.structure, self.theta[1:] - step)
             out[1 + j] = (up - down)[1:] / (2 * _STEP) @ by_coefficient
@@ -87,7 +76,7 @@ def _below(structure: Structure, theta: Real) -> Real:
 def part_of(problem: Problem, structure: Structure, theta: Real) -> Part | SampledPart:
     """Rows of a system in continuous time, or of software.
 
-    A fit is asked for its rows again where it ended: those of the last ones are kept.
+    The rows of the last fits are kept, since several steps need them again.
     """
     source = problem.source
     if source.degree == SAMPLES_ALONE:

@@ -1,9 +1,9 @@
-"""A structure's poles, and what the responses of single poles add up to.
+"""A structure's poles, and partial fractions over them.
 
 The denominator is a product of sections 1 + c₁s and 1 + c₁s + c₂s². Its poles differ, so that
-B(s)/A(s) is a sum of single poles; the derivative by a coefficient of one section, -s^m B/(A Aₖ),
-is a sum of single and double ones. The free response of an initial state is B/A again, B of one
-degree less than A and an impulse for an input: one expansion serves all.
+B(s)/A(s) is a sum of single poles. The derivative by a coefficient of one section, -s^m B/(A Aₖ),
+is a sum of single and double poles. The free response of an initial state is also a B/A, with B of
+one degree less than A and an impulse as input, and has the same expansion.
 """
 
 import math
@@ -19,51 +19,37 @@ from hmpim.model.fractions import APART, distances, fractions, parted
 
 __all__ = ["Expansion", "Parallel", "Poles", "poles_of"]
 
-
 _NONE = np.empty((0, 0), dtype=np.complex128)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Expansion:
-    """Rows that add up single poles: weights of their responses, of the slopes, and of the input.
+    """Partial fractions: rows as weights of simple responses.
 
-    Parameters
-    ----------
-    simple, double : complex ndarray, shape (rows, k)
-        Of the responses of 1/(s - p) and 1/(s - p)², one of each conjugate pair: the rows are the
-        real parts. Rows of B/A itself have no `double`.
-    direct, rate : ndarray, shape (rows,)
-        Of the input itself and of its rate. `rate` is None where that has no part.
+    `simple` and `double`, (rows, k), are weights of the responses of 1/(s - p) and 1/(s - p)², for
+    one of each conjugate pair: the rows are the real parts. Rows of B/A itself have no `double`.
+    `direct` and `rate`, (rows,), are weights of the input itself and of its rate; None if all 0.
     """
 
     simple: Complex
     double: Complex
     direct: Real
-    rate: Real | None
+    rate: Real | None = None
 
 
 class Poles:
     """Poles of a structure at given parameters, in samples.
 
-    Parameters
-    ----------
-    every : complex ndarray, shape (order + integrators,)
-        All poles.
-    section : list of int
-        Which section each belongs to; -1 for an integrator.
-    coefficients : sequence of ndarray
-        c₁ (and c₂) of each section.
+    `every`, (integrators + order,), are all poles, those of integrators first, and `coefficients`
+    are c₁ (and c₂) of each section.
     """
 
-    def __init__(
-        self, every: Complex, section: Sequence[int], coefficients: Sequence[Real]
-    ) -> None:
+    def __init__(self, every: Complex, coefficients: Sequence[Real]) -> None:
         self.every, self.coefficients = every, coefficients
-        self._first = sum(k < 0 for k in section)
         self._kept = np.flatnonzero(every.imag >= 0.0)
         self.upper = every[self._kept]
         """One of each conjugate pair."""
-        self._standing = np.where(self.upper.imag > 0, 2.0, 1.0)
+        self._multiplicity = np.where(self.upper.imag > 0, 2.0, 1.0)
         self._leading = math.prod(float(c[-1]) for c in coefficients)
         self._apart, product = distances(every)
         self._steepness = self._leading * product
@@ -71,7 +57,7 @@ class Poles:
     def expand(self, numerators: Real) -> Expansion:
         """Rows of B(s)/A(s), one for each row of `numerators`, by rising powers of s."""
         residues, constants = fractions(numerators, self.every, self._steepness, self._leading)
-        return Expansion(simple=self._halved(residues), double=_NONE, direct=constants, rate=None)
+        return Expansion(simple=self._halved(residues), double=_NONE, direct=constants)
 
     def slopes(self, numerator: Real) -> Expansion:
         """Rows of the derivatives of B(s)/A(s): by the delay, then by the sections' parameters.
@@ -97,12 +83,10 @@ class Poles:
         )
 
     def _by_parameters(self) -> tuple[Complex, Real]:
-        """1/Aₖ times the derivative of Aₖ by each parameter: residues, and what is fed through."""
+        """1/Aₖ times the derivative of Aₖ by each parameter: residues and direct terms."""
         rows = sum(c.size for c in self.coefficients)
         factors = np.zeros((rows, self.every.size), dtype=np.complex128)
-        fed = np.ones(rows)
-        row = 0
-        at = self._first
+        fed, row, at = np.ones(rows), 0, self.every.size - rows
         for c in self.coefficients:
             p = complex(self.every[at])
             if c.size == 1:
@@ -121,21 +105,16 @@ class Poles:
         return factors, fed
 
     def _halved(self, rows: Complex) -> Complex:
-        """Weights of one of each conjugate pair, which stands for both."""
-        return np.asarray(rows[:, self._kept] * self._standing)
+        """Weights for one of each conjugate pair, doubled to represent both."""
+        return np.asarray(rows[:, self._kept] * self._multiplicity)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Parallel:
-    """Sections of order 2 in parallel, with the face of `Poles`.
+    """Sections of order 2 in parallel, with the interface of `Poles`.
 
-    A numerator is one of degree 1 for each section in turn: a₁ + b₁s over A₁, a₂ + b₂s over A₂, ….
-    Each sum of poles is then one section's own, however many there are.
-
-    Parameters
-    ----------
-    sections : tuple of Poles
-        One for each.
+    A numerator has degree 1 for each section in turn: a₁ + b₁s over A₁, a₂ + b₂s over A₂, …. Each
+    sum of poles then involves one section only.
     """
 
     sections: tuple[Poles, ...]
@@ -149,26 +128,19 @@ class Parallel:
         """Rows of the sum, one for each row of `numerators`, shape (rows, 2 sections)."""
         split = np.split(numerators, len(self.sections), axis=1)
         expanded = [one.expand(n) for one, n in zip(self.sections, split, strict=True)]
-        return Expansion(
-            simple=np.hstack([e.simple for e in expanded]),
-            double=_NONE,
-            direct=np.zeros(numerators.shape[0]),
-            rate=None,
-        )
+        simple, direct = np.hstack([e.simple for e in expanded]), np.zeros(numerators.shape[0])
+        return Expansion(simple=simple, double=_NONE, direct=direct)
 
     def slopes(self, numerator: Real) -> Expansion:
         """Rows of the derivatives by the delay, then by the sections' parameters."""
         split = np.split(numerator, len(self.sections))
         own = [one.slopes(n) for one, n in zip(self.sections, split, strict=True)]
         direct = np.concatenate([[sum(e.direct[0] for e in own)], *(e.direct[1:] for e in own)])
-        return Expansion(
-            simple=np.vstack(
-                [np.hstack([e.simple[:1] for e in own]), _blocks([e.simple[1:] for e in own])]
-            ),
-            double=_blocks([np.zeros((1, 0), dtype=np.complex128), *(e.double[1:] for e in own)]),
-            direct=direct,
-            rate=None,
-        )
+        by_delay = np.hstack([e.simple[:1] for e in own])
+        simple = np.vstack([by_delay, _blocks([e.simple[1:] for e in own])])
+        none = np.zeros((1, 0), dtype=np.complex128)
+        double = _blocks([none, *(e.double[1:] for e in own)])
+        return Expansion(simple=simple, double=double, direct=direct)
 
 
 def _blocks(parts: list[Complex]) -> Complex:
@@ -177,14 +149,7 @@ def _blocks(parts: list[Complex]) -> Complex:
 
 
 def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
-    """Poles of a structure at the parameters of its sections.
-
-    Parameters
-    ----------
-    structure : Structure
-        Which sections.
-    theta : ndarray, shape (order,)
-        As for `hmpim.model.dynamics.coefficients_of`, time in samples.
+    """Poles of a structure at the parameters of its sections, (order,), time in samples.
 
     Examples
     --------
@@ -195,31 +160,21 @@ def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
     """
     flat = coefficients_of(structure, theta)
     every = [0.0 + 0.0j] * structure.integrators
-    section = [-1] * structure.integrators
     coefficients, start = [], 0
-    for k, order in enumerate(structure.sections):
+    for order in structure.sections:
         c = flat[start : start + order]
         every += [complex(-1.0 / c[0])] if order == 1 else _pair(c[0], c[1])
-        section += [k] * order
         coefficients.append(c)
         start += order
+    poles = np.array(every, dtype=np.complex128)
     if structure.parallel:
-        return Parallel(
-            sections=tuple(
-                Poles(
-                    every=np.array(_pair(c[0], c[1]), dtype=np.complex128),
-                    section=[0, 0],
-                    coefficients=[c],
-                )
-                for c in coefficients
-            )
-        )
-    poles = parted(np.array(every, dtype=np.complex128))
-    return Poles(every=poles, section=section, coefficients=coefficients)
+        pairs = zip(poles.reshape(-1, 2), coefficients, strict=True)
+        return Parallel(sections=tuple(Poles(pair, [c]) for pair, c in pairs))
+    return Poles(parted(poles), coefficients)
 
 
 def _pair(c1: float, c2: float) -> list[complex]:
-    """Roots of 1 + c₁s + c₂s², never nearer than told apart."""
+    """Roots of 1 + c₁s + c₂s², kept far enough apart for partial fractions."""
     inside = 1.0 - 4.0 * c2 / c1**2
     if abs(inside) < APART**2:
         inside = APART**2

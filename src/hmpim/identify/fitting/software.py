@@ -1,11 +1,11 @@
-"""The joint fit of software under test: sample over sample, in z, the delay a whole number.
+"""The joint fit of software under test: filters in z, with a whole number of samples of delay.
 
-Output sample k follows from input samples up to k. Poles start from an equation in the samples
-themselves, y[k] = Σ b u[k-d-j] - Σ a y[k-i], which is linear in all coefficients and exact where
-rounding is all the noise (Söderström and Stoica, System Identification, 1989, ch. 7); filtering
-input and output by the poles found removes most of its bias under noise (K. Steiglitz and L. E.
-McBride, IEEE TAC 10, 1965); the climb is the one of all fits. One triangular factor of all lagged
-samples serves every structure and every delay.
+Output sample k depends on input samples up to k. Poles start from a difference equation,
+y[k] = Σ b u[k-d-j] - Σ a y[k-i], which is linear in all coefficients, and exact if rounding is the
+only noise (Söderström and Stoica, System Identification, 1989, ch. 7). Filtering input and output
+by the estimated poles removes most of its bias under noise (K. Steiglitz and L. E. McBride, IEEE
+TAC 10, 1965). The fits themselves are those of all structures. One triangular factor of all lagged
+samples is enough for every structure and every delay.
 """
 
 from bisect import bisect_left
@@ -16,6 +16,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import begins_of
+from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -30,33 +31,32 @@ from hmpim.model.sampled import prepare_input
 
 __all__ = ["is_exact", "software_fit"]
 
-
 _ORDER = 4
-"""Output samples that an equation reaches back to."""
+"""Past output samples in an equation."""
 
 _TAPS = 16
-"""Input samples that it may take beyond the lag of the greatest cross-correlation."""
+"""Input samples in it beyond the lag of the greatest cross-correlation."""
 
 _ROWS, _GLANCES = 20_000, (160, 1000)
-"""Equations, evenly over the record, for starts, and to see whether they hold at all: few first."""
+"""Equations, spread over the record, for starts, and to check whether they hold: few first."""
 
 _EARLIER = 40
 """Samples by which the delay may be below that lag."""
 
 _LONGEST = 24
-"""Taps of a filter without poles whose differences, up to the last, are known better than 1e-9."""
+"""Most taps of an exact filter without poles, their differences known to better than 1e-9."""
 
 _NEAR = 3
-"""Delays of a structure that are followed to their end."""
+"""Delays of each structure that are fitted to convergence."""
 
 _ROUNDING = 1e-11
-"""Share of the output (r.m.s.) down to which nothing is told from rounding."""
+"""Share of the output (r.m.s.) below which a residual cannot be distinguished from rounding."""
 
 _REFINED = 4
-"""Times that input and output are filtered by the poles found."""
+"""Times that input and output are filtered by the estimated poles."""
 
 _TASTE = 6
-"""Steps from each start, and sum of squares over the least up to which it is followed on."""
+"""Steps from each start before the best ones are fitted to convergence."""
 
 _POLISHED = 1e-6
 """Precision of the chosen fits, see `fit_structure`."""
@@ -64,9 +64,10 @@ _POLISHED = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Equations:
-    """Lagged samples as columns of one triangular factor.
+    """Triangular factor of so many `rows` of lagged samples.
 
-    Columns: y[k-1] … y[k-_ORDER], u[k-first] … u[k-first-count+1], 1, y[k]; `rows` were factored.
+    Columns: y[k-1] … y[k-_ORDER], u[k-first] … u[k-first-count+1], 1, y[k]. `ar` says whether past
+    outputs count.
     """
 
     factor: Real
@@ -76,7 +77,7 @@ class _Equations:
     ar: bool
 
     def cost(self, structure: Structure, delay: int) -> tuple[float, Real]:
-        """Least sum of squares of the equation's error, and A's coefficients behind the 1."""
+        """Least sum of squares of the equation error, and the coefficients of A after the 1."""
         columns = [self.factor[:, k] for k in range(structure.order)]
         start = _ORDER + delay - self.first
         if structure.nyquist_zeros:
@@ -85,67 +86,63 @@ class _Equations:
         else:
             columns += [self.factor[:, start + k] for k in range(structure.zeros + 1)]
         columns.append(self.factor[:, -2])
-        found, left = solved_exactly(np.stack(columns), self.factor[:, -1])
-        return left, -found[: structure.order]
+        found, cost = solved_exactly(np.stack(columns), self.factor[:, -1])
+        return cost, -found[: structure.order]
 
     def costs(self, structure: Structure) -> dict[int, tuple[float, Real]]:
-        """The same at every delay; none of a filter whose past outputs do not count."""
+        """The same at every delay with all input samples; none if the past outputs do not count."""
         if structure.order and not self.ar:
             return {}
-        return {delay: self.cost(structure, delay) for delay in self.delays(structure)}
+        last = self.first + self.count - max(structure.zeros, structure.nyquist_zeros)
+        return {delay: self.cost(structure, delay) for delay in range(self.first, last)}
 
     def holds(self, structure: Structure, allowed: float) -> bool:
-        """Whether an equation of a structure leaves no more than so much."""
-        return any(left <= allowed for left, _ in self.costs(structure).values())
+        """Whether the equation error of a structure is no more than allowed at some delay."""
+        return any(cost <= allowed for cost, _ in self.costs(structure).values())
 
-    def spans(self, allowed: float) -> bool:
-        """Whether all lagged inputs together leave no more than so much."""
-        return self.cost(_transversal(self.count), self.first)[0] <= allowed
-
-    @property
-    def spread(self) -> float:
-        """Sum of squares of the output about its mean."""
-        return self.cost(_transversal(0), self.first)[0]
+    def transversal_cost(self, first: int, last: int) -> float:
+        """Least sum of squares of the equation error with input samples first to last alone."""
+        return self.cost(_transversal(last - first + 1), first)[0]
 
     @property
-    def left(self) -> float:
-        """Sum of squares that the equations leave, every sample and all structures taken."""
+    def last(self) -> int:
+        """The greatest lag of the input."""
+        return self.first + self.count - 1
+
+    @property
+    def cost_of_all(self) -> float:
+        """Sum of squares of the equation error with all lagged samples."""
         return solved_exactly(self.factor[:, :-1].T, self.factor[:, -1])[1]
 
-    def foreseen(self, taps: slice = slice(None)) -> float:
-        """Least singular value of the lagged inputs, each of unit size, over the greatest.
+    def predictability(self, taps: slice = slice(None)) -> float:
+        """Least over greatest singular value of the lagged inputs, each scaled to unit size.
 
-        Of some of them, counted from `first`, or of all.
+        `taps` selects some of them, counted from `first`.
         """
         lagged = self.factor[:, _ORDER : _ORDER + self.count][:, taps]
         sizes = np.linalg.norm(lagged, axis=0)
-        if not sizes.all():  # an impulse has left before some lags begin
+        if not sizes.all():  # an impulse may not reach some lags
             return 0.0
         found = np.linalg.svd(lagged / sizes, compute_uv=False)
         return float(found[-1] / found[0])
 
-    def delays(self, structure: Structure) -> range:
-        """Delays at which it has all samples that a structure takes."""
-        taken = max(structure.zeros, structure.nyquist_zeros)
-        return range(self.first, self.first + self.count - taken)
-
 
 def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _Equations:
-    """Factor what one output sample may follow from; of masked samples, those that count alone."""
-    # What a slower task repeats looks like its input later, and like another part of it.
-    heard = y if valid is None else np.where(valid, y, y[valid].mean())
-    lag = likeness(u, heard, u.size // 2).lag
+    """Factor the equations; if samples are masked, only those that count."""
+    # The output of a slower task resembles its input later, or another part of it.
+    filled = y if valid is None else np.where(valid, y, y[valid].mean())
+    lag = likeness(u, filled, u.size // 2).lag
     first = max(lag - _EARLIER, 0)
     last = min(lag + 2 + _TAPS, u.size // 2)
-    last = max(min(last, (u.size + 2 * first) // 3 - _ORDER), first)  # two equations an unknown
-    told, ar = np.arange(u.size) >= max(_ORDER, _unknown(u, last)), True
+    last = max(min(last, (u.size + 2 * first) // 3 - _ORDER), first)  # two equations per unknown
+    used, ar = np.arange(u.size) >= max(_ORDER, _unknown(u, last)), True
     if valid is not None:
-        unbroken = told & valid
+        unbroken = used & valid
         for k in range(1, _ORDER + 1):
             unbroken[k:] &= valid[:-k]
         ar = bool(np.count_nonzero(unbroken) > u.size // 2)
-        told = unbroken if ar else valid
-    index = np.flatnonzero(told)
+        used = unbroken if ar else valid
+    index = np.flatnonzero(used)
     index = index[:: -(-index.size // most)]
     rows = [y[np.maximum(index - k, 0)] for k in range(1, _ORDER + 1)]
     rows += [u[np.maximum(index - k, 0)] for k in range(first, last + 1)]
@@ -155,18 +152,18 @@ def _equations(u: Real, y: Real, valid: Mask | None, *, most: int = _ROWS) -> _E
 
 
 def _unknown(u: Real, reach: int) -> int:
-    """Samples at the start that may follow from input before the record.
+    """Samples at the start that may depend on input before the record.
 
-    0 where most of the input's motion is in them: it is then taken to have been at rest.
+    0 if most of the input's motion is in them: it is then assumed to have been at rest before.
     """
     steps = np.diff(u) ** 2
     return reach if float(steps[reach:].sum()) > MOST * float(steps.sum()) else 0
 
 
 def is_exact(u: Real, y: Real) -> bool:
-    """Whether an equation between samples holds to rounding: only software has no noise at all.
+    """Whether a difference equation holds to rounding: only software has no noise at all.
 
-    That of all lagged samples is asked first, of a few samples, then those of the filters.
+    All lagged samples together are tested first, on a few equations, then each filter.
 
     Parameters
     ----------
@@ -183,12 +180,13 @@ def is_exact(u: Real, y: Real) -> bool:
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
         allowed = ROUNDING**2 * float(y.var()) * equations.rows
-        if not equations.left < allowed:
+        if not equations.cost_of_all < allowed:
             return False
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True
     every = _equations(u, y, None)
-    return every.foreseen() >= ROUNDING and every.spans(allowed * every.rows / equations.rows)
+    cost = every.transversal_cost(every.first, every.last)
+    return every.predictability() >= ROUNDING and cost <= allowed * every.rows / equations.rows
 
 
 def software_fit(
@@ -199,19 +197,19 @@ def software_fit(
     structures: tuple[str, ...] = tuple(FILTERS),
     nuisance: Real | None = None,
 ) -> JointFit:
-    """Fit every filter at every delay that may be, and keep the one that the record supports.
+    """Fit every filter at every possible delay, and keep the one that the record supports.
 
     Parameters
     ----------
     u, y, valid, nuisance
         As for `hmpim.identify.fitting.joint.joint_fit`.
     structures : tuple of str
-        Of which those in `FILTERS` are tried; all of them where there is none.
+        Those in `FILTERS` are tried; all of `FILTERS` if there are none.
 
     Returns
     -------
     JointFit
-        A trial for each structure and delay followed to its end.
+        A trial for each structure and delay that was fitted.
     """
     names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
     return _software_fit(u, y, None if valid is None or valid.all() else valid, names, nuisance)
@@ -221,24 +219,20 @@ def software_fit(
 def _software_fit(
     u: Real, y: Real, valid: Mask | None, names: tuple[str, ...], nuisance: Real | None
 ) -> JointFit:
-    """The same, once for a record: it was asked whether one filter is exact."""
+    """The same, kept: an earlier question may already have made this fit."""
     equations = _equations(u, y, valid)
-    problem = Problem(
-        source=prepare_input(u, "sampled"),
-        y=y,
-        valid=valid,
-        longest_delay=u.size // 2,
-        nuisance=nuisance,
-    )
+    source, latest = prepare_input(u, "sampled"), u.size // 2
+    problem = Problem(source=source, y=y, valid=valid, longest_delay=latest, nuisance=nuisance)
     floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
-    if first.cost > floor and equations.left <= floor:  # but for what came before the record
+    if first.cost > floor and equations.cost_of_all <= floor:
+        # The filters are exact but for input before the record.
         problem = _begun_at(problem, _unknown(u, equations.first + equations.count))
         fits = _followed(problem, equations, u, names, exact=floor)
     elif first.cost > floor and (begins := begins_of(problem, first, lag=0)) is not None:
         problem = _begun_at(problem, begins)
-        fits = [fit_structure(problem, fit.structure, fit.theta) for fit in fits]
+        fits = [refit(problem, fit) for fit in fits]
     if "fir_16" in names and min(fit.cost for fit in fits) > floor:
         problem, fits = _long_filter(problem, equations, u, exact=floor) or (problem, fits)
     share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
@@ -259,52 +253,46 @@ def _software_fit(
 def _followed(
     problem: Problem, equations: _Equations, u: Real, structures: tuple[str, ...], *, exact: float
 ) -> list[Fit]:
-    """Each structure at its likeliest delays, fitted to the end; none richer than an exact one.
+    """Fit each structure at its likeliest delays, none richer than an exact one.
 
-    Where the equation of one holds but for rounding, the plainer ones are only evaluated.
+    If the equation of one structure holds to rounding, plainer ones are only evaluated.
     """
     tried: dict[Structure, dict[int, tuple[float, Real]]] = {}
     allowed = (ROUNDING / _ROUNDING) ** 2 * exact * equations.rows / problem.counted
     holding: set[Structure] = set()
     for structure in sorted((FILTERS[name] for name in structures), key=lambda s: s.parameters):
-        if holding and structure.parameters > min(one.parameters for one in holding):
-            break  # nothing but rounding is left to explain
+        if holding and structure.parameters > min(s.parameters for s in holding):
+            break  # the residual is only rounding
         tried[structure] = costs = equations.costs(structure)
-        if any(left <= allowed for left, _ in costs.values()):
+        if any(cost <= allowed for cost, _ in costs.values()):
             holding.add(structure)
     fits: list[Fit] = []
     for structure, costs in tried.items():
-        told = not holding or structure in holding
-        for delay in sorted(costs, key=lambda delay: costs[delay][0])[: _NEAR if told else 1]:
+        fitted = not holding or structure in holding
+        for delay in sorted(costs, key=lambda delay: costs[delay][0])[: _NEAR if fitted else 1]:
             theta = np.array([float(delay)])
             if structure.order:
                 below = np.concatenate([[1.0], costs[delay][1]])
-                below = _refined(problem, u, structure, delay, below) if told else below
-                theta = np.append(
-                    theta,
-                    section_parameters(structure, np.asarray(np.roots(below), dtype=np.complex128)),
-                )
+                below = _refined(problem, u, structure, delay, below) if fitted else below
+                poles = np.asarray(np.roots(below), dtype=np.complex128)
+                theta = np.append(theta, section_parameters(structure, poles))
             hopeless = TWICE * min((fit.cost for fit in fits), default=np.inf)
-            steps = _TASTE if told else 0
-            fits.append(
-                fit_structure(problem, structure, theta, iterations=steps, hopeless=hopeless)
-            )
+            most = _TASTE if fitted else 0
+            fit = fit_structure(problem, structure, theta, iterations=most, hopeless=hopeless)
+            fits.append(fit)
     if not holding:
-        fits += [walked for one in tried for walked in _walked(problem, one, fits)]
+        fits += [fit for structure in tried for fit in _walked(problem, structure, fits)]
     least = min(fit.cost for fit in fits)
-    return [
-        fit
-        if fit.cost > TWICE * least or not fit.structure.order
-        else fit_structure(problem, fit.structure, fit.theta, precision=_POLISHED)
-        for fit in fits
-    ]
+    for i, fit in enumerate(fits):
+        if fit.structure.order and fit.cost <= TWICE * least:
+            fits[i] = refit(problem, fit, precision=_POLISHED)
+    return fits
 
 
 def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:
-    """Better fits at earlier and later delays, one after the other, than the best of a structure.
+    """Move a structure's best delay earlier and later while the fit improves; the better fits.
 
-    Noise in the outputs that an equation reaches back to is no error of the output, and puts the
-    delays in an order of its own.
+    With noise in past outputs, the equation error ranks delays differently from the output error.
     """
     own = [fit for fit in fits if fit.structure == structure]
     known, found = {fit.delay for fit in own}, list[Fit]()
@@ -325,34 +313,35 @@ def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit
 def _long_filter(
     problem: Problem, equations: _Equations, u: Real, *, exact: float
 ) -> tuple[Problem, list[Fit]] | None:
-    """The shortest filter without poles that leaves nothing but rounding.
+    """The shortest filter without poles that is exact to rounding, and the data that it explains.
 
-    None where there is none, and where the input is so smooth that those of its samples foresee
-    each other: so many explain any output, by coefficients that rounding alone would move. Else
-    with the data that it explains: what follows from input before the record is left out.
+    Samples that depend on input before the record do not count. None if there is no such filter,
+    or if the input is so smooth that its samples predict each other: many taps then explain any
+    output, with coefficients that rounding alone would change.
     """
     allowed = exact * equations.rows / problem.counted
 
     def holds(first: int, last: int) -> bool:
-        return equations.cost(_transversal(last - first + 1), first)[0] <= allowed
+        return equations.transversal_cost(first, last) <= allowed
 
-    first, last = equations.first, equations.first + equations.count - 1
-    if not equations.spans(allowed):
+    first, last = equations.first, equations.last
+    if not holds(first, last):
         return None
     last = first + bisect_left(range(first, last), True, key=lambda k: holds(first, k))
     first += bisect_left(range(first, last), True, key=lambda k: not holds(k + 1, last))
     if last - first >= _LONGEST:
         return None
     taken = slice(first - equations.first, last + 1 - equations.first)
-    left = equations.cost(_transversal(last - first + 1), first)[0]
-    if np.sqrt(left / equations.spread) > TOLERATED * equations.foreseen(taken):
+    spread = equations.transversal_cost(equations.first, equations.first - 1)  # of the output
+    share = equations.transversal_cost(first, last) / spread
+    if np.sqrt(share) > TOLERATED * equations.predictability(taken):
         return None
     began = _begun_at(problem, _unknown(u, last))
     return began, [fit_structure(began, _transversal(last - first + 1), np.array([float(first)]))]
 
 
 def _begun_at(problem: Problem, first: int) -> Problem:
-    """The data from a sample on, and the free response of what came before; all from 0."""
+    """The data from a sample on, with a free response from there; all data if it is 0."""
     if not first:
         return problem
     late = np.arange(problem.y.size) >= first
@@ -366,7 +355,7 @@ def _transversal(taps: int) -> Structure:
 
 
 def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below: Real) -> Real:
-    """A after filtering input and output by 1/A some times; the one that leaves least."""
+    """A, re-estimated after filtering input and output by 1/A, while the error decreases."""
     y, n = problem.y, u.size
     moved = np.concatenate([np.full(delay, u[0]), u])[:n] - u[0]
     weights = nyquist_taps(structure)
@@ -379,10 +368,10 @@ def _refined(problem: Problem, u: Real, structure: Structure, delay: int, below:
         level = scipy.signal.lfilter([1.0], below, np.ones(n))
         rows = [np.concatenate([np.zeros(k), z[: n - k]]) for k in range(1, structure.order + 1)]
         rows += [np.concatenate([np.zeros(k), x[: n - k]]) for k in range(structure.zeros + 1)]
-        told = slice(None) if problem.valid is None else problem.valid
-        found, left = solved_exactly(np.stack([*rows, level])[:, told], z[told])
-        if left >= least:
+        counts = slice(None) if problem.valid is None else problem.valid
+        found, cost = solved_exactly(np.stack([*rows, level])[:, counts], z[counts])
+        if cost >= least:
             break
-        best, least = below, left
+        best, least = below, cost
         below = np.concatenate([[1.0], -found[: structure.order]])
     return below if np.max(np.abs(np.roots(below))) < 1.0 else best

@@ -1,24 +1,24 @@
-"""Fits to the rough response: where a climb on the samples begins, and whether it is worth making.
+"""Fits to the rough response: starts for fits to the samples, and whether these are worthwhile.
 
-The samples tell a structure's poles exactly, at the price of a response as long as the record for
-each step. The rough response tells them nearly, bin by bin, and all starts of a structure climb on
-it at once: output error with the numerator solved for (variable projection), by Levenberg and
-Marquardt.
+Samples determine a structure's poles exactly, but each step costs a response as long as the record.
+The rough response determines them approximately, and all starts of a structure are fitted to it at
+once: by output error, the numerator solved for (variable projection), with Levenberg-Marquardt.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.fitting.start import RoughResponse
-from hmpim.identify.worth import MUCH, TWICE
+from hmpim.identify.fitting.start import RoughResponse, distinct
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 
-__all__ = ["RoughFits", "condensed", "fitted_roughly", "left_roughly", "reweighted"]
+__all__ = ["RoughFits", "condensed", "fitted_roughly", "residual_of", "reweighted"]
 
 _ALONE = 128
-"""Bins up to this one stay single; each octave above is grouped into half as many."""
+"""Bins up to this one stay single; each octave above is condensed into half as many groups."""
 
 _STEPS = 10
 """Most steps on the rough response."""
@@ -27,26 +27,22 @@ _STILL = 1e-2
 """A step that lowers the squared error by less than this share counts as no gain."""
 
 _FACTOR = 10.0
-"""The damping is divided by this after a step that gains, and multiplied after one that does not;
-a start stops once its damping exceeds it."""
+"""The damping is divided by this after a step that gains, else multiplied; a start stops once its
+damping exceeds it."""
 
 _LEAST = 1e-12
-"""Share of a diagonal element that is added to normal equations: less is rounding."""
+"""Share of each diagonal element that is added to normal equations: less is rounding."""
 
 _REWEIGHTINGS = 6
-"""Times that Sanathanan and Koerner's equations are weighted by the denominator found so far."""
+"""Times that Sanathanan and Koerner's equations are weighted by the latest denominator."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RoughFits:
     """Fits to a rough response.
 
-    Parameters
-    ----------
-    error : float
-        Least share of its power that is missed.
-    likely : ndarray, shape (k, 1 + order)
-        Parameters of the fits that miss no more than twice as much, the best first.
+    `error` is the least share of its power that is missed, and `likely`, (k, 1 + order), holds the
+    parameters of the fits that miss at most twice as much, the best first.
     """
 
     error: float
@@ -54,7 +50,7 @@ class RoughFits:
 
 
 def condensed(rough: RoughResponse) -> RoughResponse:
-    """The same response, neighbouring bins taken together where they are many to an octave."""
+    """The same response, neighbouring bins averaged where an octave has many."""
     octave = np.maximum(np.floor(np.log2(np.maximum(rough.bins, 1) / _ALONE)) + 1.0, 0.0)
     group = rough.bins // (2 ** octave.astype(np.int64)) + (_ALONE * octave).astype(np.int64)
     starts = np.flatnonzero(np.diff(group, prepend=-1))
@@ -80,20 +76,10 @@ def fitted_roughly(
     held: bool = False,
     steps: int = _STEPS,
 ) -> RoughFits:
-    """Climb from all starts of a structure at once.
+    """Fit a structure without integrators from all starts, (k, 1 + order), at once.
 
-    Parameters
-    ----------
-    rough : RoughResponse
-        Better `condensed`.
-    structure : Structure
-        Without an integrator.
-    thetas : ndarray, shape (k, 1 + order)
-        Starts.
-    held : bool
-        Whether the delay stays.
-    steps : int
-        At most so many.
+    The rough response is best `condensed`. The delay stays if it is `held`. At most so many
+    `steps` are taken.
     """
     now = _Rough(rough, structure, thetas)
     damping = np.full(len(thetas), 1e-3)
@@ -107,55 +93,36 @@ def fitted_roughly(
         if np.all(still & (better | (damping > _FACTOR))):
             break
     least = float(now.errors.min())
-    likely: list[Real] = []
-    for i in np.argsort(now.errors):
-        apart = all(np.max(np.abs(now.thetas[i] - other)) > MUCH for other in likely)
-        if now.errors[i] <= TWICE * least and apart:
-            likely.append(now.thetas[i])
+    order = [i for i in np.argsort(now.errors) if now.errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)
-    return RoughFits(error=least / (power or 1.0), likely=np.array(likely))
+    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(now.thetas[order])))
 
 
 def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:
-    """Sanathanan and Koerner's iteration at many delays at once.
+    """Sanathanan and Koerner's iteration at many delays, (k,), at once; not for modes in parallel.
 
-    Parameters
-    ----------
-    rough, structure
-        As for `fitted_roughly`; not of sections in parallel.
-    delays : ndarray, shape (k,)
-        In samples.
-
-    Returns
-    -------
-    errors : ndarray, shape (k,)
-        Least squared output error at each delay.
-    denominators : ndarray, shape (k, order + 1)
-        A by rising powers of s per sample over the highest frequency, A(0) = 1.
+    Returned are the least squared output error at each delay, (k,), and the denominators,
+    (k, order + 1), by rising powers of s over the highest frequency, A(0) = 1.
     """
     order, first, last = structure.order, structure.dc_zeros, structure.zeros
-    above = np.arange(first, last + 1)
+    above, below = np.arange(first, last + 1), np.arange(order + 1)
+    rows, split = np.append(below, above), order + 1
+    grid, turn = rows[:, None] + rows, (1j ** np.arange(-8, 9))[rows - rows[:, None] + 8]
     x = rough.omega / rough.omega[-1]
     powers = x ** np.arange(2 * max(order, last) + 1)[:, None]
     target = rough.response * np.exp(1j * rough.omega * (delays[:, None] - rough.lag))
     size = np.abs(rough.response) ** 2
-    below = np.arange(order + 1)
-    turns = 1j ** np.arange(-8, 9)
     weight = np.broadcast_to(rough.weight, target.shape)
     errors, best = np.full(delays.size, np.inf), np.ones((delays.size, order + 1))
     for _ in range(_REWEIGHTINGS):
         own = (weight * size) @ powers.T
         fixed = weight @ powers.T
         mixed = (weight * target.conj()) @ powers.T
-        grid = below[:, None] + below
-        gram = np.empty((delays.size, order + 1 + above.size, order + 1 + above.size))
-        gram[:, : order + 1, : order + 1] = own[:, grid] * turns[below - below[:, None] + 8].real
-        grid = above[:, None] + above
-        gram[:, order + 1 :, order + 1 :] = fixed[:, grid] * turns[above - above[:, None] + 8].real
-        grid = below[:, None] + above
-        across = -(mixed[:, grid] * turns[above - below[:, None] + 8]).real
-        gram[:, : order + 1, order + 1 :] = across
-        gram[:, order + 1 :, : order + 1] = across.swapaxes(1, 2)
+        across = -(mixed[:, grid[:split, split:]] * turn[:split, split:]).real
+        gram = np.empty((delays.size, rows.size, rows.size))
+        gram[:, :split, :split] = own[:, grid[:split, :split]] * turn[:split, :split].real
+        gram[:, split:, split:] = fixed[:, grid[split:, split:]] * turn[split:, split:].real
+        gram[:, :split, split:], gram[:, split:, :split] = across, across.swapaxes(1, 2)
         scale = np.sqrt(np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny))
         scaled = _ridged(gram / (scale[:, :, None] * scale[:, None, :]))
         found = np.linalg.solve(scaled[:, 1:, 1:], -scaled[:, 1:, :1])[..., 0]
@@ -163,18 +130,18 @@ def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tupl
         denominators = np.insert(found[:, :order], 0, 1.0, axis=1)
         a = (denominators * 1j**below) @ powers[: order + 1]
         b = (found[:, order:] * 1j**above) @ powers[first : last + 1]
-        left = target - b / a
-        error = (left.real**2 + left.imag**2) @ rough.weight
+        missed = target - b / a
+        error = (missed.real**2 + missed.imag**2) @ rough.weight
         better = error < errors
         errors[better], best[better] = error[better], denominators[better]
         weight = rough.weight / (a.real**2 + a.imag**2)
     return errors, best
 
 
-def left_roughly(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
-    """What of a rough response a structure leaves over at given parameters, (1 + order,)."""
-    left = _Rough(rough, structure, theta[None]).left[0].view(np.complex128)
-    response = np.asarray(left / np.sqrt(rough.weight), dtype=np.complex128)
+def residual_of(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
+    """Residual of a rough response for a structure at given parameters, (1 + order,)."""
+    weighted = _Rough(rough, structure, theta[None]).residuals[0].view(np.complex128)
+    response = np.asarray(weighted / np.sqrt(rough.weight), dtype=np.complex128)
     return replace(rough, response=response)
 
 
@@ -194,9 +161,7 @@ class _Rough:
             if structure.zeros == structure.order - 1:
                 rows = np.concatenate([rows, rows * (s * scale)], axis=1)
         else:
-            whole = late
-            for each in below:
-                whole = whole * each
+            whole = math.prod(below, start=late)
             powers = (s * scale) ** np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
             rows = whole[:, None, :] * powers
         self._rows = rows
@@ -204,8 +169,8 @@ class _Rough:
         target = _real(rough.response * root)
         self._gram = _ridged(self._real @ self._real.swapaxes(1, 2))
         self.linear = np.linalg.solve(self._gram, self._real @ target[:, None])[..., 0]
-        self.left = target - (self.linear[:, None, :] @ self._real)[:, 0]
-        errors = np.vecdot(self.left, self.left)
+        self.residuals = target - (self.linear[:, None, :] @ self._real)[:, 0]
+        errors = np.vecdot(self.residuals, self.residuals)
         self.errors = np.where(np.isfinite(errors), errors, np.inf)
 
     def steps(self, damping: Real) -> Real:
@@ -222,10 +187,10 @@ class _Rough:
         rows = _real(np.stack(slopes, axis=1))
         mixed = rows @ self._real.swapaxes(1, 2)
         normal = rows @ rows.swapaxes(1, 2)
-        # Of a direction that the numerator takes up whole, rounding is left, of either sign.
+        # For a direction that the numerator explains fully, only rounding remains, of either sign.
         least = np.finfo(float).eps * np.einsum("kii->ki", normal) + np.finfo(float).tiny
         normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
-        moment = rows @ self.left[..., None]
+        moment = rows @ self.residuals[..., None]
         diagonal = np.maximum(np.einsum("kii->ki", normal), least)
         scale = np.sqrt(diagonal)
         scaled = normal / (scale[:, :, None] * scale[:, None, :])
@@ -234,9 +199,9 @@ class _Rough:
         return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
     def unless(self, better: Mask, before: "_Rough") -> "_Rough":
-        """The same, but where it is not better what was before."""
+        """The same, with the state before where this one is not better."""
         if not better.all():
-            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "left"):
+            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "residuals"):
                 getattr(self, name)[~better] = getattr(before, name)[~better]
             self._sections = _sections(self.structure, self.thetas, self._s)
         return self
@@ -248,7 +213,7 @@ def _real(rows: Complex) -> Real:
 
 
 def _ridged(gram: Real) -> Real:
-    """The same with its diagonal raised by what rounding may have made of it."""
+    """The same with its diagonal raised by about its rounding error."""
     diagonal = np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny)
     return np.asarray(gram + _LEAST * diagonal[:, :, None] * np.eye(gram.shape[-1]))
 
@@ -271,7 +236,7 @@ def _sections(
 
 
 def _bounded(structure: Structure, thetas: Real) -> Real:
-    """Keep shapes above 0: a pole of the right half plane."""
+    """Limit time constants, and keep shapes above 0: below, a pole is in the right half plane."""
     start = 1
     for order in structure.sections:
         thetas[:, start] = np.clip(thetas[:, start], -30.0, 30.0)

@@ -1,20 +1,20 @@
 """Starting values from the data alone: delay and denominator, for any structure.
 
-1. The lag of the greatest cross-correlation gives delay plus what the dynamics add.
-2. With the output moved back by that lag, both records are tapered and their spectra
-   divided: a response nearly free of leakage.
-3. For every delay at once, and a few guesses of the corner frequency, the denominator that
-   makes ``G e^(jωτ) A(jω)`` constant is a small linear least-squares problem (E. C. Levy, IRE
-   Trans. Autom. Control 4, 1959) whose only terms that depend on the delay are inverse Fourier
-   transforms. Reweighting by the last denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8,
-   1963) removes its bias.
-4. The few delays at which the output error is least locally are the starts.
+1. The lag of the greatest cross-correlation gives the delay plus the lag of the dynamics.
+2. With the output moved back by that lag, both records are tapered and their spectra divided: a
+   response nearly free of leakage.
+3. For every delay at once, and a few guesses of the corner frequency, the denominator that makes
+   ``G e^(jωτ) A(jω)`` constant is a small linear least-squares problem (E. C. Levy, IRE Trans.
+   Autom. Control 4, 1959); only inverse Fourier transforms in it depend on the delay. Reweighting
+   by the last denominator (C. K. Sanathanan and J. Koerner, IEEE TAC 8, 1963) removes its bias.
+4. The delays with the lowest local minima of the output error are the starts.
 
-Levy's error weighs noise by the denominator. Where noise is most of the output, starts are those
-of a grid of denominators that explain most of the power, the best delay of each by one inverse
-transform: the likelihood itself, of white noise.
+Levy's error weights noise by the denominator. Where noise is most of the output, starts come from
+a grid of denominators, those that explain most of the power; one inverse transform gives the best
+delay of each. For white noise this is the likelihood itself.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -29,42 +29,49 @@ from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import MUCH
 from hmpim.model.dynamics import Structure, theta_of
 
-__all__ = ["RoughResponse", "rough_response", "searched", "starting_values"]
+__all__ = [
+    "RoughResponse",
+    "distinct",
+    "local_minima",
+    "rough_response",
+    "searched",
+    "starting_values",
+]
 
 _STAMPED_LATE = -2
-"""Least delay in samples that is looked for where the output follows the input."""
+"""Least delay in samples of a start where the output follows the input."""
 
 _DYNAMICS = 24
-"""Samples at least that dynamics add to the delay of an output that is ahead."""
+"""Least lag of the dynamics, in samples, assumed for an output that is ahead."""
 
 _TAPER = 0.1
 """Share of the record tapered at either end."""
 
 _PHASE_STEP = 0.3
-"""Steps of the delay looked at turn the highest frequency by no more than this, in rad."""
+"""Most phase of one step of the delay at the highest frequency, in rad."""
 
 _FINE, _COARSE = 8, 2
 """Most delay steps per sample, with one guess of the corner frequency and with several."""
 
 _CORNERS = (0.08, 0.25, 1.0)
-"""Where, over the highest frequency, the first weight begins to roll off as 1/A would: above
-the system's own corner the response is noise, which an unweighted fit takes at face value."""
+"""Corners, over the highest frequency, from which the first weight rolls off as 1/A would: above
+the system's own corner the response is noise, which a fit without weight would follow."""
 
 _STEPS = 12
 """Corner frequencies of the grid, over the decade and a half below the highest."""
 
 _SHAPES = (0.1, 0.3, 1.0)
-"""Its damping ratios: neighbours' resonances overlap."""
+"""Its damping ratios: the resonances of neighbours overlap."""
 
 _TURNS, _LATE = 64, 64
-"""Bins of a long record are taken together where a delay of `lag + _LATE` samples turns them
-against each other by less than a turn over `_TURNS`."""
+"""Bins of a long record are grouped while a delay of `lag + _LATE` samples turns their phases apart
+by less than a turn over `_TURNS`."""
 
 _ENOUGH = 16384
-"""Samples from which on they are: so many as a group has would be left."""
+"""Samples of a record with at least as many bins as remain after grouping."""
 
 _FLOOR = 1e-3
-"""Bins whose input amplitude is below this share of the greatest are not looked at."""
+"""Bins whose input amplitude is below this share of the greatest are ignored."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +83,7 @@ class RoughResponse:
     lag : int
         Samples by which the output was moved back; below 0 where it is ahead of the input.
     length : int
-        Length of the transform whose bins these are.
+        Length of the transform.
     bins : ndarray of int, shape (m,)
         Bins with excitation.
     omega : ndarray, shape (m,)
@@ -86,7 +93,7 @@ class RoughResponse:
     weight : ndarray, shape (m,)
         Power of the input, largest 1.
     ahead : int or None
-        Lag below 0 at which the output resembles the input most; None if it does so behind it.
+        Lag below 0 at which the output resembles the input most; None if that lag is not below 0.
     """
 
     lag: int
@@ -99,13 +106,14 @@ class RoughResponse:
 
     @property
     def earliest(self) -> int:
-        """Least pure delay to look at, in samples."""
+        """Least pure delay to consider, in samples."""
         if self.lag >= _STAMPED_LATE:
             return _STAMPED_LATE
         return self.lag - max(-self.lag // 4, _DYNAMICS)
 
 
 def _tapered(x: Real) -> Real:
+    """Samples less their weighted mean, both ends tapered."""
     edge = max(int(_TAPER * x.size), 1)
     ramp = np.sin(0.5 * np.pi * (np.arange(edge) + 0.5) / edge) ** 2
     inner = x[edge : x.size - edge]
@@ -118,7 +126,7 @@ def _tapered(x: Real) -> Real:
 
 @kept
 def _tapered_transform(u: Real, length: int) -> Complex:
-    """Of an input, its ends tapered, padded to a length."""
+    """Transform of an input, its ends tapered, padded to a length."""
     return np.asarray(scipy.fft.rfft(_tapered(u), length), dtype=np.complex128)
 
 
@@ -132,14 +140,14 @@ def rough_response(
     u, y : ndarray, shape (n,)
         Uniform samples.
     longest_delay : int
-        Greatest lag to look at, in samples.
+        Greatest lag to consider, in samples.
     lag : int, optional
         Coarse delay in samples; that of the cross-correlation, 0 or more, if None.
     """
     ahead = None
     if lag is None:
-        seen = likeness(u, y, longest_delay)
-        lag, ahead = seen.lag, seen.lead
+        alike = likeness(u, y, longest_delay)
+        lag, ahead = alike.lag, alike.lead
     overlap = u.size - abs(lag)
     group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
@@ -148,23 +156,22 @@ def rough_response(
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
-    if lag and not power.any():  # the input stands still where both are
+    if lag and not power.any():  # the input stands still in the overlap
         return rough_response(u, y, longest_delay=longest_delay, lag=0)
     bins = np.flatnonzero(power > _FLOOR**2 * power.max())
-    weight = power[bins] / power.max()
     return RoughResponse(
         lag=lag,
         length=length,
         bins=bins,
         omega=2 * np.pi * bins / length,
         response=cross[bins] / power[bins],
-        weight=weight,
+        weight=power[bins] / power.max(),
         ahead=ahead,
     )
 
 
 def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
-    """Sum over so many neighbouring bins around each multiple of `group`, shape (m,)."""
+    """Sum over `group` neighbouring bins around each multiple of it, shape (m,)."""
     if group == 1:
         return values
     before = group // 2
@@ -174,11 +181,11 @@ def _grouped(values: NDArray[Any], group: int) -> NDArray[Any]:
 
 @lru_cache(maxsize=16)
 def _chirp(bins: int, shifts: int, length: int) -> tuple[Complex, Complex]:
-    """A chirp, and the transform of its conjugate about 0, for so many bins and shifts.
+    """A chirp, and the transform of its conjugate around 0, for so many bins and shifts.
 
     With c(k) = e^(jπk²/length), e^(2πj km/length) = c(k) c(m) / c(m - k): a sum over a few bins
-    at a few shifts is a convolution, which costs transforms as long as both together and not as
-    long as the record (L. I. Bluestein, IEEE Trans. Audio Electroacoust. 18, 1970).
+    at a few shifts is a convolution, whose transforms are as long as both together, and not as the
+    record (L. I. Bluestein, IEEE Trans. Audio Electroacoust. 18, 1970).
     """
     k = np.arange(max(bins, shifts), dtype=np.int64)
     chirp = _turned(k * k, 2 * length)
@@ -189,13 +196,11 @@ def _chirp(bins: int, shifts: int, length: int) -> tuple[Complex, Complex]:
 
 
 def _turned(turns: NDArray[np.int64], length: int) -> Complex:
-    """e^(2πj turns/length); whole turns are taken off, since their rounding grows."""
+    """e^(2πj turns/length); whole turns are removed, since their rounding grows."""
     return np.asarray(np.exp(2j * np.pi / length * (turns % length)))
 
 
-def _at_shifts(
-    rough: RoughResponse, rows: Complex, shifts: NDArray[np.intp], finer: int
-) -> NDArray[np.float64]:
+def _at_shifts(rough: RoughResponse, rows: Complex, shifts: NDArray[np.intp], finer: int) -> Real:
     """Real parts of Σ rows e^(jω shift/finer) over the bins, at neighbouring shifts, (..., k)."""
     length, first = rough.length * finer, int(rough.bins[0])
     count = int(rough.bins[-1]) - first + 1
@@ -219,7 +224,7 @@ def starting_values(
     structure : Structure
         What will be fitted.
     count : int
-        At most so many.
+        Most starts.
     thorough : bool
         Try several guesses of the corner frequency; one if False.
 
@@ -228,10 +233,7 @@ def starting_values(
     list of ndarray, shape (1 + order,)
         Delay in samples, parameters of the denominator's sections.
     """
-    most = _COARSE if thorough else _FINE
-    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, most))
-    shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
-    order = structure.order
+    order, (finer, shifts) = structure.order, _shifts(rough, _COARSE if thorough else _FINE)
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     # Multiplied by A's coefficients and e^(jω shift), these should sum to a constant.
     terms = np.vander(1j * rough.omega / scale, order + 1, increasing=True).T * rough.response
@@ -243,43 +245,28 @@ def starting_values(
         roll_off = 1.0 + (rough.omega / (corner * rough.omega[-1])) ** 2
         first = rough.weight / roll_off ** min(order, 2)
         cost, coefficients = _levy(rough, terms, shifts, finer, first)
-        for i in _local_minima(cost, 2):
+        for i in local_minima(cost, 2):
             shift, a = shifts[i], coefficients[i]
-            for _ in range(2):  # Sanathanan-Koerner: reweight, look nearby for the delay again
+            for _ in range(2):  # Sanathanan-Koerner: reweight, search nearby delays again
                 weight = rough.weight / np.abs(_polynomial(a, rough.omega / scale)) ** 2
                 near = shifts[np.abs(shifts - shift) <= max(3, shifts.size // 8)]
                 local, solved = _levy(rough, terms, near, finer, weight)
                 best = int(np.argmin(local))
                 shift, a = near[best], solved[best]
-            physical = _stable(a, order)
-            error = _output_error(rough, shift / finer, physical, scale)
-            theta = np.concatenate(
-                [
-                    [rough.lag + shift / finer],
-                    theta_of(structure, physical / scale ** np.arange(1, order + 1)),
-                ]
-            )
-            found.append((error, theta))
+            powers = np.arange(1, order + 1)
+            stable = np.maximum(a, 1e-2**powers)
+            error = _output_error(rough, shift / finer, stable, scale)
+            sections = theta_of(structure, stable / scale**powers)
+            found.append((error, np.append(rough.lag + shift / finer, sections)))
     found.sort(key=lambda item: item[0])
-    starts: list[Real] = []
-    for _, theta in found:
-        if all(np.max(np.abs(theta - other)) > MUCH for other in starts):
-            starts.append(theta)
-    return starts[:count]
+    return distinct(theta for _, theta in found)[:count]
 
 
-def searched(rough: RoughResponse, structure: Structure, *, count: int = 3) -> list[Real]:
-    """Starts for a pole or two in much noise: what explains most of the power on a grid.
-
-    Parameters
-    ----------
-    rough, structure, count
-        As for `starting_values`; a structure of no other order has none.
-    """
+def searched(rough: RoughResponse, structure: Structure) -> list[Real]:
+    """Starts for one or two poles in much noise: those of a grid that explain most of the power."""
     if structure.sections not in ((1,), (2,)):
         return []
-    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, _FINE))
-    shifts = np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
+    finer, shifts = _shifts(rough, _FINE)
     found: list[tuple[float, Real]] = []
     for corner in rough.omega[-1] * np.geomspace(0.03, 1.0, _STEPS):
         for shape in _SHAPES if structure.order == 2 else _SHAPES[-1:]:
@@ -290,9 +277,24 @@ def searched(rough: RoughResponse, structure: Structure, *, count: int = 3) -> l
             best = int(np.argmax(explained))
             theta = theta_of(structure, a / corner ** np.arange(1, structure.order + 1))
             delay = rough.lag + shifts[best] / finer
-            found.append((-float(explained[best]), np.concatenate([[delay], theta])))
+            found.append((-float(explained[best]), np.append(delay, theta)))
     found.sort(key=lambda item: item[0])
-    return [theta for _, theta in found[:count]]
+    return [theta for _, theta in found[:3]]
+
+
+def distinct(thetas: Iterable[Real]) -> list[Real]:
+    """Parameters without those that are close to earlier ones."""
+    found: list[Real] = []
+    for theta in thetas:
+        if all(np.max(np.abs(theta - other)) > MUCH for other in found):
+            found.append(theta)
+    return found
+
+
+def _shifts(rough: RoughResponse, most: int) -> tuple[int, NDArray[np.intp]]:
+    """Steps of the delay per sample, at most so many, and delays to try, in steps from the lag."""
+    finer = int(np.clip(np.ceil(rough.omega[-1] / _PHASE_STEP), 1, most))
+    return finer, np.arange(min(rough.earliest - rough.lag, 0) * finer, 2 * finer + 1)
 
 
 def _polynomial(a: Real, x: Real) -> Complex:
@@ -320,27 +322,21 @@ def _levy(
     a = np.linalg.solve(inner, -reduced[:, 1:, :1])[:, :, 0]
     full = np.concatenate([np.ones((shifts.size, 1)), a], axis=1)
     cost = np.einsum("ki,kij,kj->k", full, reduced, full)
-    # An unstable denominator fits by running time backwards.
+    # An unstable denominator would fit backwards in time.
     return np.where(np.all(a > 0, axis=1), cost, cost + gram[0, 0]), a
 
 
-def _local_minima(cost: Real, count: int) -> list[int]:
+def local_minima(cost: Real, count: int) -> list[int]:
+    """Indices of the lowest local minima, ends included, the lowest first."""
     inside = np.concatenate([[np.inf], cost, [np.inf]])
     low = np.flatnonzero((inside[1:-1] <= inside[:-2]) & (inside[1:-1] <= inside[2:]))
     return [int(i) for i in low[np.argsort(cost[low])][:count]]
 
 
-def _stable(a: Real, order: int) -> Real:
-    """Nearest positive coefficients."""
-    floor = 1e-2 ** np.arange(1, order + 1)
-    return np.asarray(np.maximum(a, floor))
-
-
 def _output_error(rough: RoughResponse, shift: float, a: Real, scale: float) -> float:
-    """Weighted squared error of the response itself, gain solved."""
+    """Weighted squared error of the response itself, with the best gain."""
     target = rough.response * np.exp(1j * rough.omega * shift)
     model = 1.0 / _polynomial(a, rough.omega / scale)
-    gain = (rough.weight * model.conj() * target).sum().real / (
-        rough.weight * np.abs(model) ** 2
-    ).sum()
+    power = (rough.weight * np.abs(model) ** 2).sum()
+    gain = (rough.weight * model.conj() * target).sum().real / power
     return float((rough.weight * np.abs(target - gain * model) ** 2).sum())

@@ -1,4 +1,4 @@
-"""What was tried, and what is chosen of it."""
+"""All trials of a joint fit, and the choice among them."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ __all__ = ["JointFit", "Trial", "likeliest_of", "trial_of"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trial:
-    """One structure under one assumption, fitted; `criterion` lower is better."""
+    """One structure fitted under one assumption; a lower `criterion` is better."""
 
     intersample: Intersample
     fit: Fit
@@ -32,14 +32,14 @@ class JointFit:
     problem : Problem
         The data under the chosen assumption, with the samples that counted.
     weighed : Problem
-        The same with the noise whitened, as all trials were weighed.
+        The same with the noise whitened, as all trials were compared.
     best : Trial
         The chosen one.
     trials : tuple of Trial
         All, the chosen one included.
     forgotten : int
-        Samples left out at the beginning because the record does not begin at rest: as long as
-        the output still depends on input before it.
+        Samples omitted at the beginning because the record does not begin at rest: the output
+        there still depends on earlier input.
     effective_share : float
         Independent samples per sample, from the best residual's correlation.
     related : bool
@@ -47,9 +47,9 @@ class JointFit:
     silent : bool
         Whether no model can: the output does not answer the input at all.
     rivals : tuple of Trial
-        Fits with one more pole, under the chosen assumption, that are as likely but for its price.
+        Fits with one more pole, under the chosen assumption, that lose only by its price.
     hidden : HiddenPole or None
-        What the record says of one more pole; None where it was not asked.
+        The test for one more pole; None if it was not made.
     """
 
     problem: Problem
@@ -65,31 +65,30 @@ class JointFit:
 
     @property
     def lingers(self) -> bool:
-        """Whether a free response lasts long that no plain model has: a drift looks like it."""
+        """Whether the free response of a rich model is so slow that it may be a drift."""
         fit = self.best.fit
         long = fit.memory > MUCH * self.problem.y.size
         return bool(self.forgotten) and long and fit.structure.name not in PLAIN
 
     @property
     def weighed_share(self) -> float:
-        """Independent samples per sample of the weighed problem: all, once noise is whitened."""
+        """Independent samples per sample of `weighed`: 1 if the noise is whitened."""
         return self.effective_share if self.weighed.noise is None else 1.0
 
 
 def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -> Trial:
-    """A fit weighed by Schwarz's criterion, of so many independent samples.
+    """A fit with Schwarz's criterion for `count` independent samples.
 
-    No sum of squares counts as less than `floor`, where rounding tells nothing.
+    Sums of squares below `floor` are only rounding, and count as `floor`.
     """
     least = max(floor, float(np.finfo(float).tiny))
-    criterion = count * np.log(
-        max(fit.objective, least) / count
-    ) + fit.structure.parameters * np.log(count)
-    return Trial(intersample=mode, fit=fit, criterion=float(criterion))
+    misfit = count * np.log(max(fit.objective, least) / count)
+    criterion = float(misfit + fit.structure.parameters * np.log(count))
+    return Trial(intersample=mode, fit=fit, criterion=criterion)
 
 
 def likeliest_of(trials: list[Trial], natural: Intersample) -> Trial:
-    """The likeliest trial; a natural one no richer than it unless the odds are beyond 20."""
+    """The likeliest trial; a natural one no richer, unless the odds against it exceed 20."""
     best = min(trials, key=lambda trial: trial.criterion)
     most = best.fit.structure.parameters
     rivals = [t for t in trials if t.intersample == natural and t.fit.structure.parameters <= most]

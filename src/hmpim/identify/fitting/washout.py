@@ -1,7 +1,7 @@
 """A washout in place of a drift.
 
-Where the input keeps its level, or moved before the record, a washout leaves a slow response
-behind. Plain dynamics and a drift look like it, but the drift knows nothing of the input.
+A washout responds slowly to an input that keeps its level, or moved before the record. Plain
+dynamics and a drift look the same, but the drift does not depend on the input.
 """
 
 import numpy as np
@@ -15,27 +15,22 @@ from hmpim.model.dynamics import STRUCTURES
 __all__ = ["washed_out"]
 
 _SPANS = (0.05, 0.15, 0.5)
-"""Time constants of a washout to begin with, over the record."""
+"""Time constants of a washout in starts, over the record length."""
 
 
 def washed_out(problem: Problem, fit: Fit) -> Fit | None:
-    """Return a plain fit's dynamics with a washout; None if they are not plain.
+    """Fit a plain fit's dynamics with a washout; None if they are not plain.
 
     Parameters
     ----------
-    problem : Problem
-        The data, without a drift.
-    fit : Fit
-        As it ended beside the drift.
+    problem, fit : Problem, Fit
+        The data without a drift, and the fit with it.
     """
     if fit.structure.name not in PLAIN:
         return None
     sections = one_more_pole(fit.structure).sections
-    richer = next(
-        known
-        for known in STRUCTURES.values()
-        if known.sections == sections and known.dc_zeros == known.zeros == 1
-    )
+    washouts = (known for known in STRUCTURES.values() if known.dc_zeros == known.zeros == 1)
+    richer = next(washout for washout in washouts if washout.sections == sections)
     best: Fit | None = None
     for span in _SPANS:
         slow = span * problem.y.size
@@ -43,6 +38,5 @@ def washed_out(problem: Problem, fit: Fit) -> Fit | None:
         theta[0] += slow
         hopeless = np.inf if best is None else TWICE * best.objective
         found = fit_structure(problem, richer, theta, hopeless=hopeless)
-        if best is None or found.objective < best.objective:
-            best = found
+        best = found if best is None or found.objective < best.objective else best
     return best

@@ -1,4 +1,4 @@
-"""The noise of a joint fit: one autoregression, for starts and for the weighing."""
+"""The noise of a joint fit: one autoregression, for starts and for comparing fits."""
 
 from dataclasses import replace
 
@@ -7,13 +7,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import (
-    Data,
-    Seen,
-    follows,
-    polished,
-    refit_all,
-)
+from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit_all
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
@@ -24,14 +18,14 @@ from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Intersample
 
-__all__ = ["distance_of", "is_contradicted", "prewhitened_of", "refit_whitened", "weighed_by_noise"]
+__all__ = ["is_contradicted", "prewhitened_of", "refit_whitened", "weighed_by_noise"]
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -> Data | None:
-    """Data with the noise whitened, where its colour hides the response; None elsewhere.
+    """Data with the noise whitened, if its colour hides the response; None otherwise.
 
-    Input and output are filtered alike, so that the response stays: starts are sought in what a
-    wander or a line leaves free.
+    Input and output pass the same filter, so that the response stays the same, and starts are
+    sought without wander and lines.
     """
     fit = min(fits, key=lambda f: f.objective)
     problem = data.problem(mode, seen)
@@ -42,8 +36,8 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     if noise.size == 1:
         return None
     whitened = problem.coloured(noise)
-    left = whitened.innovations(fit.prediction, fit.residual)
-    if float(left @ left) > PART * fit.cost:
+    innovations = whitened.innovations(fit.prediction, fit.residual)
+    if float(innovations @ innovations) > PART * fit.cost:
         return None
     u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
     y = y if seen.valid is None else y * whitened.told
@@ -52,10 +46,10 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
 
 
 def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
-    """Data weighed by the colour and the level of what the best fit leaves over.
+    """Data with the colour and the level of the best fit's residual as their noise model.
 
-    As they come where that still follows the input: it is no noise, and whitening it would hide
-    what a model lacks.
+    Without one if that residual still follows the input: it is no noise, and whitening it would
+    hide what the model lacks.
     """
     if (fit.is_white and fit.is_steady) or follows(data, fit):
         return data.plain
@@ -66,10 +60,8 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     return replace(data, noise=noise, level=level)
 
 
-def refit_whitened(
-    data: Data, fitted: list[tuple[Intersample, Fit]], seen: Seen
-) -> list[tuple[Intersample, Fit]]:
-    """All fits once more under one noise model, the hopeless ones as they are."""
+def refit_whitened(data: Data, fitted: Fits, seen: Seen) -> Fits:
+    """Refit all fits under one noise model, but only evaluate hopeless ones."""
     least = min(fit.objective for _, fit in fitted)
     return refit_all(data, fitted, seen, hopeful=TWICE * least)
 
@@ -77,9 +69,9 @@ def refit_whitened(
 def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     """Whether whitening moves the estimate farther than noise could.
 
-    A right model is estimated without bias with the noise whitened or not; where the two part,
-    what is left over is no noise but what the model lacks (J. A. Hausman, Econometrica 46, 1978).
-    The products of a compressed record do not show how far coloured noise moves an estimate.
+    A right model is estimated without bias, with the noise whitened or not; if the two estimates
+    differ, the residual is no noise but shows a deficient model (J. A. Hausman, Econometrica 46,
+    1978). The products of a compressed record do not allow this test.
     """
     if not data.keeps_samples:
         return False
@@ -90,28 +82,21 @@ def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
     unknown = plain.theta.size
     cov = covariance(rows, plain.residual, freedom=freedom, white=False)[:unknown, :unknown]
     apart = plain.theta - best.fit.theta
-    return not distance_of(apart, cov) < scipy.special.chdtri(unknown, FALSE_ALARM)
+    return not _squared_distance(apart, cov) < scipy.special.chdtri(unknown, FALSE_ALARM)
 
 
-def distance_of(apart: Real, cov: Real) -> float:
-    """Square of how far two estimates are apart, in deviations: d' C⁻¹ d.
+def _squared_distance(apart: Real, cov: Real) -> float:
+    """Squared distance between two estimates, d' C⁻¹ d.
 
-    Each parameter counts in deviations of its own, so that one which the record does not determine,
-    as the delay within a held sample, hides none of the others.
-
-    Parameters
-    ----------
-    apart : ndarray, shape (p,)
-        Difference of the estimates.
-    cov : ndarray, shape (p, p)
-        Its covariance.
+    Each parameter is scaled by its own deviation, so that one which the record does not determine,
+    such as the delay within a held sample, hides none of the others.
 
     Examples
     --------
-    >>> round(distance_of(np.array([0.0, 3.0]), np.diag([1e14, 1.0])), 6)
+    >>> round(_squared_distance(np.array([0.0, 3.0]), np.diag([1e14, 1.0])), 6)
     9.0
     """
     spread = np.sqrt(np.diag(cov))
-    spread[spread == 0.0] = 1.0  # of a fit that leaves nothing
-    alike = np.linalg.pinv(cov / np.outer(spread, spread), rcond=1e-12, hermitian=True)
-    return float(apart / spread @ alike @ (apart / spread))
+    spread[spread == 0.0] = 1.0  # for an exact fit
+    scaled = np.linalg.pinv(cov / np.outer(spread, spread), rcond=1e-12, hermitian=True)
+    return float(apart / spread @ scaled @ (apart / spread))

@@ -1,9 +1,11 @@
-"""The noise: one room for all that is said of what no input moves.
+"""The noise: the part of the output that does not depend on any input.
 
 whiteness       whether it is white, and how many of its samples are independent
-autoregression  its past foretells it: the filter that whitens it, and its spectrum
-covariance      the error bars that a fit has under it
-misfit          whether it is noise at all, or still follows the input
-colour          its kind in words: correlated, rumbling, a line; and whether the bias drifts
+autoregression  the filter that whitens it, and its spectrum
+covariance      the covariance of a fit under it
+level           its level along the record
+misfit          whether a residual is noise at all, or still follows the input
+spectra         spectra of an input, shared by several steps
+colour          its kind in words: correlated, low-frequency, a line; and whether the bias drifts
 input_noise     noise on the input itself
 """

@@ -1,11 +1,11 @@
-"""The noise as an autoregression: its order from the data, gaps left out.
+"""The noise as an autoregression: its order from the data, gaps omitted.
 
 Least squares on the samples whose whole past is known (the covariance method: Kay, Modern
-Spectral Estimation, 1988, ch. 7), which tells wander and lines without bias. One Cholesky
-decomposition gives what every order leaves over; the order is that of H. Akaike's criterion (IEEE
-Trans. Autom. Control 19, 1974). All that asks for the colour of a noise asks here; the products
-of samples and their past come from the samples, from statistics, or, where the filter must be
-stable, from the autocovariance (Yule and Walker).
+Spectral Estimation, 1988, ch. 7) estimates wander and lines without bias. One Cholesky
+decomposition gives the residual power of every order; H. Akaike's criterion chooses the order
+(IEEE Trans. Autom. Control 19, 1974). The products of samples and their past come from the
+samples, from statistics, or, if the filter must be stable, from the autocovariance (Yule and
+Walker).
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 LONGEST = 30
-"""Greatest order that is tried."""
+"""Greatest order tried."""
 
 _BLOCK = 65_536
 _FLICKER_BINS = 32
@@ -44,9 +44,9 @@ _MOST_INNOVATIONS = 100_000
 
 
 def autoregression(residual: Real, valid: Mask | None) -> Real:
-    """Filter that leaves white noise of a residual, 1 first, shape (order + 1,).
+    """Filter that whitens a residual, (n,), of zero mean; 1 first, shape (order + 1,).
 
-    The residual, (n,), is 0 on average; samples that are not `valid` do not count.
+    Samples that are not `valid` do not count.
 
     Examples
     --------
@@ -55,17 +55,20 @@ def autoregression(residual: Real, valid: Mask | None) -> Real:
     >>> autoregression(noise, None)[:2].round(2).tolist()
     [1.0, -0.9]
     """
-    longest = min(LONGEST, residual.size // 20, _reach(valid))
+    longest = min(LONGEST, residual.size // 20)
+    if valid is not None:  # enough samples must remain between the gaps
+        ends = int(np.count_nonzero(valid[:-1] & ~valid[1:])) + 1
+        longest = min(longest, int(PART * np.count_nonzero(valid) / ends))
     if longest < 1:
         return np.ones(1)
     return whitening_filter(*_moments(residual, valid, longest))
 
 
 def whitening_filter(gram: Real, count: int) -> Real:
-    """Filter that leaves white noise, from the products of a sample and its past.
+    """Whitening filter, 1 first, from the products of a sample and its past.
 
-    `gram`, (k + 1, k + 1), holds sums over so many samples of products of a sample and the k before
-    it, the sample itself first. The filter is 1 first; its order, at most k, is Akaike's.
+    `gram`, (k + 1, k + 1), holds sums over `count` samples of products of a sample, first, and the
+    k before it. Akaike's criterion chooses the order, at most k.
 
     Examples
     --------
@@ -74,35 +77,27 @@ def whitening_filter(gram: Real, count: int) -> Real:
     """
     if not gram[0, 0] > 0.0:
         return np.ones(1)
-    left, ordered = _left(gram)
-    order = int(np.argmin(count * np.log(left) + 2.0 * np.arange(left.size)))
+    shares, ordered = _innovation_shares(gram)
+    order = int(np.argmin(count * np.log(shares) + 2.0 * np.arange(shares.size)))
     if order == 0:
         return np.ones(1)
     weights = np.linalg.solve(ordered[:order, :order], ordered[:order, -1])
     return np.concatenate([[1.0], -weights])
 
 
-def _left(gram: Real) -> tuple[Real, Real]:
-    """Share of its power that each order leaves of a sample; the products, it standing last."""
+def _innovation_shares(gram: Real) -> tuple[Real, Real]:
+    """Share of the power that each order cannot predict; the scaled products, the sample last."""
     scale = max(float(gram[0, 0]), np.finfo(float).tiny)
-    # Latest sample last: the factor's last row holds what each order explains of it.
+    # With the latest sample last, the factor's last row holds the power that each order explains.
     ordered = np.roll(gram, -1, axis=(0, 1)) / scale
     ordered += 1e-13 * np.trace(ordered) * np.eye(gram.shape[0])
     try:
         factor = np.linalg.cholesky(ordered)
-    except np.linalg.LinAlgError:  # sums less exact than what is left of them: nearer to white
+    except np.linalg.LinAlgError:  # rounding exceeds the innovation: assume it nearer to white
         ordered -= 2.0 * np.linalg.eigvalsh(ordered)[0] * np.eye(gram.shape[0])
         factor = np.linalg.cholesky(ordered)
     explained = np.concatenate([[0.0], np.cumsum(factor[-1, :-1] ** 2)])
     return np.maximum(ordered[-1, -1] - explained, np.finfo(float).tiny), ordered
-
-
-def _reach(valid: Mask | None) -> int:
-    """Greatest order that leaves enough samples between the gaps."""
-    if valid is None:
-        return LONGEST
-    ends = int(np.count_nonzero(valid[:-1] & ~valid[1:])) + 1
-    return int(PART * np.count_nonzero(valid) / ends)
 
 
 def _moments(residual: Real, valid: Mask | None, longest: int) -> tuple[Real, int]:
@@ -121,12 +116,12 @@ def _moments(residual: Real, valid: Mask | None, longest: int) -> tuple[Real, in
 def innovation_gain(y: Real, residual: Real) -> float:
     """Log-likelihood by which a residual is more likely than the output, both as coloured noise.
 
-    Each is taken as an autoregression of its own (order 12, least squares, so that wander and
-    lines are told exactly); what that cannot foresee of the output, the model must explain.
+    Each is modelled as an autoregression of its own (order 12, by least squares, which is exact
+    for wander and lines). A model gains only by explaining the unpredictable part of the output.
 
     Examples
     --------
-    A wandering output has nothing that its own past does not tell:
+    The past of a wandering output predicts all of it but noise:
 
     >>> rng = np.random.default_rng(0)
     >>> wander, pulses = np.cumsum(rng.standard_normal(2000)), rng.standard_normal(2000)
@@ -138,32 +133,32 @@ def innovation_gain(y: Real, residual: Real) -> float:
     if y.size > _MOST_INNOVATIONS:
         middle = slice((y.size - _MOST_INNOVATIONS) // 2, (y.size + _MOST_INNOVATIONS) // 2)
         y, residual = y[middle], residual[middle]
-    unforeseen = _innovation(residual)
-    if unforeseen <= 0.0:
-        return float("inf") if _innovation(y) > 0.0 else 0.0
+    before, after = _innovation_power(y), _innovation_power(residual)
+    if after <= 0.0:
+        return float("inf") if before > 0.0 else 0.0
     size = y.size - _INNOVATION_ORDER
-    return float(0.5 * size * np.log(max(_innovation(y) / unforeseen, np.finfo(float).tiny)))
+    return float(0.5 * size * np.log(max(before / after, np.finfo(float).tiny)))
 
 
-def _innovation(x: Real) -> float:
-    """Mean square of what an autoregression of that order does not foresee, the mean taken off."""
+def _innovation_power(x: Real) -> float:
+    """Mean square of the innovation of samples, their mean removed, at that order."""
     gram, count = _moments(x - x.mean(), None, min(_INNOVATION_ORDER, x.size // 10))
-    return float(gram[0, 0] * _left(gram)[0][-1] / count) if gram[0, 0] > 0.0 else 0.0
+    return float(gram[0, 0] * _innovation_shares(gram)[0][-1] / count) if gram[0, 0] > 0.0 else 0.0
 
 
 @kept
 def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
-    """The same filter from the autocovariance, stable always, and the power that it leaves.
+    """The whitening filter from the autocovariance, always stable, and the innovation power.
 
-    The residual, (n,), is 0 where a sample does not count. Orders up to `longest` are tried, less
-    for fewer than ten times as many samples.
+    The residual, (n,), is 0 where a sample does not count. The order is at most `longest`, and a
+    tenth of the number of samples.
 
     Examples
     --------
     >>> from scipy.signal import lfilter
     >>> noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(5000))
-    >>> filtering, left = yule_walker(noise)
-    >>> filtering[:2].round(2).tolist(), round(left, 1)
+    >>> whitening, power = yule_walker(noise)
+    >>> whitening[:2].round(2).tolist(), round(power, 1)
     ([1.0, -0.9], 1.0)
     """
     gram = scipy.linalg.toeplitz(autocovariance(residual, min(longest, residual.size // 10)))
@@ -172,7 +167,7 @@ def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
 
 
 def spectrum_behind(noise: Real, omega: Real) -> Real:
-    """Power spectrum of what a filter turns into white noise of power 1, at rad per sample."""
+    """Power spectrum of noise that a filter whitens to a power of 1, at radians per sample."""
     return np.asarray(np.abs(np.exp(-1j * np.outer(omega, np.arange(noise.size))) @ noise) ** -2)
 
 
@@ -181,22 +176,21 @@ def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
 
     Equal to the variance at every frequency if the noise is white.
     """
-    noise, left = yule_walker(residual)
-    power = left * spectrum_behind(noise, omega)
+    noise, innovation = yule_walker(residual)
+    power = innovation * spectrum_behind(noise, omega)
     at = omega * residual.size / (2 * np.pi)
     low = at <= _low_bins(residual).size
-    weights, kinds = _kinds(residual, noise, left, at[low])
+    weights, kinds = _kinds(residual, noise, innovation, at[low])
     power[low] = kinds[np.argmax(weights)]
     return np.asarray(power)
 
 
 def deviation_of_mean(residual: Real, counted: int) -> float:
-    """Deviation of the mean of a noise over `counted` samples, widened for what it does not say.
+    """Deviation of the mean of a noise over `counted` samples; 1.96 of these hold with 95 %.
 
-    The variance of a mean is the power at half a bin over the samples. That power is known by the
-    lowest bins alone: given the kind of noise, the mean is distributed as Student's t, and the
-    kinds are averaged by how likely they are. 1.96 of these deviations hold with 95 %. Of the noise
-    its mean is taken off.
+    The variance of a mean is the power at half a bin over the number of samples. Only the lowest
+    bins determine that power: given the kind of noise, the mean follows Student's t, and the kinds
+    are averaged by their likelihood. The noise has zero mean.
 
     Examples
     --------
@@ -219,26 +213,27 @@ def deviation_of_mean(residual: Real, counted: int) -> float:
 
 
 def _low_bins(residual: Real) -> Real:
-    """The bins that an autoregression does not tell apart; none of a short record."""
+    """The lowest bins, which an autoregression does not resolve; none for a short record."""
     count = min(_FLICKER_BINS, residual.size // 8)
     return np.arange(1.0, count + 1.0) if count >= _FEWEST_BINS else np.empty(0)
 
 
-def _kinds(residual: Real, noise: Real, left: float, at: Real) -> tuple[Real, Real]:
-    """How likely each kind of noise is by the lowest bins, (k,), and its power there, (k, m).
+def _kinds(residual: Real, noise: Real, innovation: float, at: Real) -> tuple[Real, Real]:
+    """Likelihood of each kind of noise by the lowest bins, (k,), and its power `at` bins, (k, m).
 
-    An autoregression, or power that rises towards DC as f^-α, which a short one levels off. With
-    the level unknown, bins I about a shape s have the likelihood Π s⁻¹ (Σ I/s)^-N (P. Whittle,
-    1953); beforehand all kinds are as likely. `noise` and `left` are `yule_walker`'s.
+    The kinds are an autoregression, and power that rises towards DC as f^-α, which a short
+    autoregression would level off. With unknown level, bins I around a shape s have the likelihood
+    Π s⁻¹ (Σ I/s)^-N (P. Whittle, 1953); the kinds are equally likely beforehand. `noise` and
+    `innovation` are from `yule_walker`.
     """
     n, bins, at = residual.size, _low_bins(residual), np.maximum(at, 0.5)
-    behind = left * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
-    seen = np.abs(scipy.fft.rfft(residual)[1 : bins.size + 1]) ** 2 / n
-    if not seen.any() or not behind.all():
+    behind = innovation * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
+    power = np.abs(scipy.fft.rfft(residual)[1 : bins.size + 1]) ** 2 / n
+    if not power.any() or not behind.all():
         return np.ones(1), behind[None, bins.size :]
     rising = np.concatenate([bins, at]) ** -np.array(_SLOPES)[:, None]
     shapes = np.vstack([behind, rising])
     inside, outside = shapes[:, : bins.size], shapes[:, bins.size :]
-    levels = np.mean(seen / inside, axis=1)
+    levels = np.mean(power / inside, axis=1)
     likelihood = -np.sum(np.log(inside), axis=1) - bins.size * np.log(levels)
     return scipy.special.softmax(likelihood), levels[:, None] * outside

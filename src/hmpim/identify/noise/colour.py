@@ -1,6 +1,6 @@
-"""What the noise is like: white, correlated, rumbling, or with a line; and whether the bias drifts.
+"""The kind of noise: white, correlated, low-frequency, or with a line; and whether the bias drifts.
 
-All of it is read off the residual of a fit, so it is as good as the fit is.
+All of it is estimated from the residual of a fit, and is only as good as the fit.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from hmpim.identify.worth import TOLERATED
 __all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "line_of", "noise_colour", "tone_of"]
 
 Colour = Literal["white", "autoregressive", "power_law"]
-"""White; correlated over a few samples (AR(1)); or as a power of the frequency (1/f, wander)."""
+"""White; correlated over a few samples (AR(1)); or a power of the frequency (1/f, wander)."""
 
 _NEIGHBOURS = 30
 """Bins on either side that a line is compared with."""
@@ -32,13 +32,13 @@ class NoiseColour:
     Parameters
     ----------
     kind : {'white', 'autoregressive', 'power_law'}
-        The likelier description; a line is left out of it.
+        The likelier description, apart from a line.
     coefficient : float
         Correlation between one sample and the next: the AR(1) coefficient.
     exponent : float
         α of a power spectrum that goes as f^-α; 0 is white, 1 flicker, 2 random walk.
     line_frequency : float or None
-        Frequency of the strongest line that stands out of the noise, Hz.
+        Frequency of the strongest line above the noise, Hz.
     """
 
     kind: Colour
@@ -70,9 +70,9 @@ class Drift:
     slope : float
         The residual's unit per second.
     std : float
-        Its standard deviation, the noise's own colour taken into account.
+        Its standard deviation, for noise of any colour.
     probability : float
-        Chance of a slope so great without any drift.
+        Chance of so great a slope without any drift.
     """
 
     slope: float
@@ -81,10 +81,10 @@ class Drift:
 
 
 def noise_colour(residual: Real, fs: float) -> NoiseColour:
-    """Describe the noise that a fit leaves over.
+    """Describe the noise in the residual of a fit, (m,), by the samples that count.
 
-    Of AR(1) and a power law, each fitted by Whittle's likelihood (P. Whittle, Arkiv för Matematik
-    2, 1953), the likelier. Samples that do not count are left out of the residual, (m,).
+    Coloured noise is AR(1) or a power law, the likelier of the two, each fitted by Whittle's
+    likelihood (P. Whittle, Arkiv för Matematik 2, 1953).
 
     Examples
     --------
@@ -108,9 +108,9 @@ def noise_colour(residual: Real, fs: float) -> NoiseColour:
 
 
 def bias_drift(residual: Real, time: Real) -> Drift:
-    """Slope of the bias that a model with a constant one leaves over, (n,), at rising times.
+    """Slope in the residual, (n,), of a model with a constant bias, at rising times.
 
-    Its error holds for coloured noise.
+    Its error is valid for coloured noise.
 
     Examples
     --------
@@ -123,20 +123,20 @@ def bias_drift(residual: Real, time: Real) -> Drift:
     """
     rows = np.stack([np.ones(time.size), time - time.mean()])
     slope = float(rows[1] @ residual / (rows[1] @ rows[1]))
-    left = residual - residual.mean() - slope * rows[1]
-    if not np.any(left):
+    noise = residual - residual.mean() - slope * rows[1]
+    if not np.any(noise):
         return Drift(slope=slope, std=0.0, probability=float(slope == 0.0))
-    variance = covariance(rows, left, freedom=time.size - 2, white=is_white(left))[1, 1]
-    std = float(np.sqrt(max(variance, _wandering_variance(rows[1], left))))
-    freedom = max((time.size - 2) * effective_share(left), 1.0)
+    variance = covariance(rows, noise, freedom=time.size - 2, white=is_white(noise))[1, 1]
+    std = float(np.sqrt(max(variance, _wandering_variance(rows[1], noise))))
+    freedom = max((time.size - 2) * effective_share(noise), 1.0)
     chance = float(2 * scipy.stats.t.sf(abs(slope) / std, freedom))
     return Drift(slope=slope, std=std, probability=chance)
 
 
 def _wandering_variance(ramp: Real, e: Real) -> float:
-    """Variance of the slope under noise whose power goes as f^-α down to the record's length.
+    """Variance of the slope under noise whose power is f^-α down to the record's length.
 
-    0 unless the noise is so slow that no autoregression reaches its lowest frequencies.
+    0 unless the noise is so slow that no autoregression describes its lowest frequencies.
     """
     if is_white(e):
         return 0.0
@@ -156,7 +156,7 @@ def _wandering_variance(ramp: Real, e: Real) -> float:
 
 
 def line_of(e: Real, fs: float) -> float | None:
-    """Frequency in Hz of the strongest narrow line of samples (n,), their mean 0, or None."""
+    """Frequency in Hz of the strongest narrow line in samples (n,) of zero mean, or None."""
     n = e.size
     size = float(np.max(np.abs(e)))
     if n < 8 * _NEIGHBOURS or size == 0.0:
@@ -179,7 +179,7 @@ def line_of(e: Real, fs: float) -> float | None:
 
 
 def tone_of(e: Real, frequency: float) -> Real:
-    """Part of a residual, its mean 0, that is a line at `frequency` in cycles per sample."""
+    """The line at `frequency`, in cycles per sample, in a residual of zero mean."""
     phase = 2 * np.pi * frequency * np.arange(e.size)
     rows = np.stack([np.cos(phase), np.sin(phase)])
     return np.asarray(np.linalg.solve(rows @ rows.T, rows @ e) @ rows)

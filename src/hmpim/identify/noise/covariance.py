@@ -1,11 +1,10 @@
 """The covariance of a fit under noise of any colour.
 
-With white noise the covariance of a maximum-likelihood fit is the Cramér-Rao bound,
-σ² (JᵀJ)⁻¹. With coloured noise the same fit scatters as the sandwich
-(JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹ (Söderström and Stoica, System Identification, 1989, ch. 7), R from an
-autoregression fitted to the residual. Noise whose level changes along the record counts as loud
-as it is where each parameter is seen (H. White, Econometrica 48, 1980; MacKinnon and White,
-J. Econometrics 29, 1985).
+With white noise the covariance of a maximum-likelihood fit is the Cramér-Rao bound, σ² (JᵀJ)⁻¹.
+With coloured noise it is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹ (Söderström and Stoica, System
+Identification, 1989, ch. 7), R from an autoregression fitted to the residual. If the noise level
+changes along the record, each sample counts with its own level (H. White, Econometrica 48, 1980;
+MacKinnon and White, J. Econometrics 29, 1985).
 """
 
 from collections.abc import Callable
@@ -21,18 +20,18 @@ from hmpim.identify.worth import PART
 __all__ = ["covariance", "white_covariance"]
 
 _WELL = 1e-4
-"""Least diagonal element of a triangular factor that normal equations still give accurately."""
+"""Least diagonal element of a triangular factor that normal equations give accurately."""
 
 
 def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of the parameters of a least-squares fit, (p, p).
 
-    `rows`, (p, n), are derivatives of the prediction, `freedom` the samples that counted less the
-    parameters. Finite but very large along a direction that the record does not see.
+    `rows`, (p, n), are derivatives of the prediction, and `freedom` is the number of samples that
+    count less that of the parameters. Finite but very large along an undetermined direction.
     """
     gram = rows @ rows.T
     norm = np.sqrt(gram.diagonal())
-    scale = np.where(norm > 1e-100 * norm.max(), norm, 1.0)  # a row of zeros stays one
+    scale = np.where(norm > 1e-100 * norm.max(), norm, 1.0)  # a row of zeros stays zero
     inverse, basis = _orthonormal(gram / np.outer(scale, scale), rows, scale)
     if white:
         inner = np.eye(scale.size) * float(residual @ residual) / freedom
@@ -43,27 +42,28 @@ def covariance(rows: Real, residual: Real, *, freedom: int, white: bool) -> Real
         power = autoregressive_spectrum(residual, omega) * residual.size / freedom
         power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
         inner = ((spectra * power) @ spectra.conj().T).real / length
-    inner = _as_loud(inner, basis, residual, white=white)
+    inner = _with_level(inner, basis, residual, white=white)
     return np.asarray(inverse @ inner @ inverse.T / np.outer(scale, scale))
 
 
-def _as_loud(inner: Real, basis: Callable[[], Real], residual: Real, *, white: bool) -> Real:
-    """Return the covariance of the whitened slopes for noise as loud as it is at each sample.
+def _with_level(inner: Real, basis: Callable[[], Real], residual: Real, *, white: bool) -> Real:
+    """Return the covariance of the whitened slopes for noise with its own level at each sample.
 
-    What noise of its mean level gives in the same sum scales it, so that all else of it stays.
+    It is scaled by the ratio of two sums, with these levels and with their mean.
     """
     noise = np.ones(1) if white else yule_walker(residual)[0]
-    left = residual if white else scipy.signal.lfilter(noise, np.ones(1), residual)
-    if is_steady(left):
+    innovations = residual if white else scipy.signal.lfilter(noise, np.ones(1), residual)
+    if is_steady(innovations):
         return inner
     rows = basis()
-    # What a fit takes from a sample of the noise is not in its residual.
-    loud = left / np.maximum(1.0 - np.sum(rows**2, axis=0), PART)
+    # A fit absorbs part of the noise in each sample.
+    whole = innovations / np.maximum(1.0 - np.sum(rows**2, axis=0), PART)
     if not white:
         rows = scipy.signal.lfilter(np.ones(1), noise, rows[:, ::-1])[:, ::-1]
-    counted = max(int(np.count_nonzero(left)), 1)
-    mean, own = rows @ rows.T * float(left @ left) / counted, (rows * loud) @ (rows * loud).T
-    if not (inner.diagonal().all() and mean.diagonal().all()):  # a row that moves nothing
+    counted = max(int(np.count_nonzero(innovations)), 1)
+    mean = rows @ rows.T * float(innovations @ innovations) / counted
+    own = (rows * whole) @ (rows * whole).T
+    if not (inner.diagonal().all() and mean.diagonal().all()):  # a row of zeros
         return inner
     turn = np.linalg.cholesky(inner) @ np.linalg.inv(np.linalg.cholesky(mean))
     return np.asarray(turn @ own @ turn.T)
@@ -72,8 +72,8 @@ def _as_loud(inner: Real, basis: Callable[[], Real], residual: Real, *, white: b
 def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
     """Return `covariance` for white noise, from products instead of rows.
 
-    `gram`, (p, p), holds the rows' products, and `power` is the residual's sum of squares. None
-    where the products determine a direction too inaccurately.
+    `gram`, (p, p), holds the products of the rows, and `power` is the residual's sum of squares.
+    None where the products determine a direction too inaccurately.
     """
     scale = np.sqrt(gram.diagonal())
     inverse = _inverse_factor(gram / np.outer(scale, scale)) if scale.all() else None
@@ -89,7 +89,7 @@ def _inverse_factor(gram: Real) -> Real | None:
 
 
 def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[], Real]]:
-    """Return the inverse of R, and a function that makes Q', (p, n): the scaled rows are (Q R)'.
+    """Return the inverse of R and a function that returns Q', (p, n): the scaled rows are (Q R)'.
 
     By normal equations, unless they determine a direction too inaccurately.
     """

@@ -1,7 +1,7 @@
-"""Noise on the input itself: the stimulus was measured, not merely commanded.
+"""Noise on the input itself, if the stimulus was measured and not just commanded.
 
-A fit takes the input as exact. If it carries noise of its own, the model is driven by that
-too, and every gain comes out smaller by the share of the noise in the input's power.
+A fit assumes that the input is exact. Measurement noise on it drives the model too, and every gain
+is then underestimated by the share of the noise in the input's power.
 """
 
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ class InputNoise:
     std : float
         Standard deviation, in the input's unit.
     attenuation : float
-        Share by which a gain found at an average frequency of the band comes out too small:
-        the noise's power in the band over all power there.
+        Share by which gains are underestimated on average over the band: the noise's share of the
+        power in it.
     """
 
     std: float
@@ -38,8 +38,8 @@ class InputNoise:
 def input_noise(u: Real, fs: float, *, band: tuple[float, float]) -> InputNoise | None:
     """Estimate the noise on an input, (n,), from its spectrum above the excited band, in Hz.
 
-    None where there is none to be seen: no flat floor above the arithmetic's own, or an input
-    (steps, PRBS, noise) that excites all frequencies, in which nothing can be told.
+    None if no noise is detected: there is no flat floor above rounding, or the input (steps, PRBS,
+    noise) excites all frequencies, so that its noise is not identifiable.
 
     Examples
     --------
@@ -66,17 +66,17 @@ def input_noise(u: Real, fs: float, *, band: tuple[float, float]) -> InputNoise 
     variance = _level(floor)
     if variance <= 1e-20 * float(np.ptp(u)) ** 2 or halves[1] <= 0:
         return None
-    # Steps and kinks of the stimulus fall off with frequency; noise does not.
+    # Steps and kinks of the stimulus decay with frequency; noise does not.
     if not TWICE**-2 < halves[0] / halves[1] < TWICE**2 or not _is_rough(u, variance):
         return None
     total = float(np.mean(power[max(int(low * bins), 1) : int(np.ceil(high * bins)) + 1]))
-    if total < TWICE**2 * variance:  # the band does not stand out: all of it is the stimulus
+    if total < TWICE**2 * variance:  # the band does not stand out: all of it is stimulus
         return None
     return InputNoise(std=float(np.sqrt(variance)), attenuation=variance / total)
 
 
 def _end(power: Real) -> int:
-    """Last bin that stands out of what fills the top of the spectrum, which noise may be."""
+    """Last bin above the level of the top of the spectrum, which may be noise."""
     width = max(power.size // 50, 5)
     summed = np.cumsum(np.concatenate([[0.0], power]))
     mean = (summed[width:] - summed[:-width]) / width
@@ -86,12 +86,12 @@ def _end(power: Real) -> int:
 
 
 def _level(power: Real) -> float:
-    """Mean of exponentially distributed power, from its median: a line does no harm."""
+    """Mean of exponentially distributed power, from its median, which ignores a line."""
     return median(power) / float(np.log(2.0))
 
 
 def _is_rough(samples: Real, variance: float) -> bool:
-    """Whether noise shows between jumps as well; a clean square wave stands still there."""
+    """Whether there is noise between jumps too; a clean square wave is constant there."""
     every = every_of(samples.size)
     first, second, third, last = (samples[k : k - 3 or None : every] for k in range(4))
     differences = last - first - 3.0 * (third - second)

@@ -1,4 +1,4 @@
-"""How loud noise is along a record, where its level changes."""
+"""The level of noise along a record."""
 
 import numpy as np
 
@@ -9,25 +9,25 @@ from hmpim.identify.worth import PART
 __all__ = ["level_of", "steadiness"]
 
 _KURTOSIS = 3.0
-"""Of a normal noise."""
+"""Kurtosis of normal noise."""
 
 _PARTS = 20
-"""Parts of the record over which a level is told."""
+"""Parts of the record over each of which a level is estimated."""
 
 _FEWEST = 50
-"""Samples that tell a level to a tenth."""
-
+"""Samples that determine a level to a tenth."""
 
 _WINDOWS = 4
-"""Times that about which a level is told, which a record needs to show that it changes."""
+"""Least length of a record, in such parts, to show that the level changes."""
 
 
 def level_of(innovations: Real) -> Real | None:
-    """Level of white noise at each sample, over its geometric mean: r.m.s. about each sample.
+    """Local r.m.s. of white noise at each sample, over its geometric mean.
 
-    Samples divided by it have one level, and their sum of squares is the likelihood's (R. J.
-    Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the r.m.s. of all. A
-    sample of 0 does not count. None where the level does not change, or too few samples tell.
+    Samples divided by it have a constant level, and their sum of squares is that of the likelihood
+    (R. J. Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the overall
+    r.m.s. Samples of 0 do not count. None if the level does not change, or there are too few
+    samples.
 
     Examples
     --------
@@ -56,9 +56,9 @@ def level_of(innovations: Real) -> Real | None:
 
 
 def steadiness(residual: Real) -> float:
-    """Samples of steady normal noise that tell its level as well, per sample of a residual.
+    """Samples of steady normal noise that determine a level as well as one sample of a residual.
 
-    3 times the squared mean of its squares over the mean of their squares; 1 where `is_steady`.
+    3 over the kurtosis of the residual; 1 if it `is_steady`.
 
     Examples
     --------

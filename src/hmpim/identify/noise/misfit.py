@@ -1,4 +1,4 @@
-"""Whether what is left over still follows the input."""
+"""Whether a residual still follows the input."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,12 +13,11 @@ from hmpim.identify.worth import DEEPEST, PART
 
 __all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
 
-
 _GROUPS = 24
-"""Groups of neighbouring bins that the band is cut into, at most."""
+"""Most groups of neighbouring bins in the band."""
 
 _NEAR = 24
-"""Bins on either side of a line that show the noise there."""
+"""Bins on either side of a line from which its noise is estimated."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +30,7 @@ class Misfit:
         Share of the residual's in-band power that a smooth response to the input explains,
         beyond what noise would; 0 when none.
     probability : float
-        Chance of seeing so much, or more, were the model right.
+        Chance of so much, or more, if the model were right.
     """
 
     share: float
@@ -41,35 +40,31 @@ class Misfit:
 def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) -> Misfit:
     """Test whether the residual is still coherent with the input.
 
-    The residual's spectrum is divided into groups of neighbouring bins; in each, one
-    complex gain from the input is fitted. Under a right model the power that it takes up
-    is that of two degrees of freedom of the noise of the same group, so colour does no harm. The
-    input is moved by the delay, in samples, so that the gain is smooth over a group. The excited
-    band is in cycles per sample.
+    The residual's spectrum is divided into groups of neighbouring bins, and in each one complex
+    gain from the input is fitted. If the model is right, that gain explains two degrees of freedom
+    of the noise in the same group, whatever its colour. The input is moved by the delay, in
+    samples, so that the gain is smooth over a group. The excited band is in cycles per sample.
 
-    Where the input has a few lines alone, neighbouring bins have no gain in common, and noise whose
-    colour is steep passes for one. There the power at the lines is held against that beside them.
+    If the input consists of a few lines, neighbouring bins have no gain in common, and steeply
+    coloured noise would look like one. Then the power at the lines is compared with that next to
+    them.
     """
-    lines = _left_at_lines(u, residual, band)
+    lines = _misfit_at_lines(u, residual, band)
     if lines is not None:
         return lines
     stimulus = transform_of(u)
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
-    share, probability = misfits(
-        stimulus[:bins],
-        _transform(residual, bins)[None],
-        samples=u.size,
-        delays=np.array([delay]),
-        band=band,
-    )
-    return Misfit(share=float(share[0]), probability=float(probability[0]))
+    spectra, delays = _transform(residual, bins)[None], np.array([delay])
+    found = misfits(stimulus[:bins], spectra, samples=u.size, delays=delays, band=band)
+    share, probability = (float(values[0]) for values in found)
+    return Misfit(share=share, probability=probability)
 
 
-def _left_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
-    """Test whether a residual is stronger at the lines of an input than beside them.
+def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
+    """Test whether a residual is stronger at the lines of an input than next to them.
 
-    The powers after a window, of which every other bin is independent: an F test, and the share of
-    the power that lies above the noise. None of an input that leaves no room between lines.
+    An F test on the windowed spectrum, of which every other bin is independent, and the share of
+    the power that exceeds the noise. None if the input has no lines with room between them.
     """
     power = windowed_power(u)
     first = max(int(band[0] * u.size) - _NEAR, 1)
@@ -79,16 +74,16 @@ def _left_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit
     window = np.ones(2 * _NEAR + 1)
     if not 0 < count < PART * moved.size or moved.size < window.size:
         return None
-    left = windowed_power(residual)[inside]
-    others = np.convolve(np.where(moved, 0.0, left), window, mode="same")
+    power = windowed_power(residual)[inside]
+    others = np.convolve(np.where(moved, 0.0, power), window, mode="same")
     room = np.convolve(~moved, window, mode="same")
     if not np.all((others[moved] > 0.0) & (room[moved] >= _NEAR // 2)):
         return None
     noise = others[moved] / room[moved]
-    ratio = float(np.mean(left[moved] / noise))
-    above = float(np.sum(left[moved] - noise))
+    ratio = float(np.mean(power[moved] / noise))
+    above = float(np.sum(power[moved] - noise))
     return Misfit(
-        share=max(above, 0.0) / float(left.sum()),
+        share=max(above, 0.0) / float(power.sum()),
         probability=float(scipy.special.fdtrc(count, float(room[moved].min()), ratio)),
     )
 
@@ -100,12 +95,7 @@ def _transform(residual: Real, bins: int) -> Complex:
 
 
 def misfits(
-    stimulus: Complex,
-    residuals: Complex,
-    *,
-    samples: int,
-    delays: Real,
-    band: tuple[float, float],
+    stimulus: Complex, residuals: Complex, *, samples: int, delays: Real, band: tuple[float, float]
 ) -> tuple[Real, Real]:
     """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
 
@@ -118,31 +108,26 @@ def misfits(
     if not power.size:
         return np.zeros(delays.size), np.ones(delays.size)
     noise = (total - taken) / (width - 1)
-    told = np.all(noise > 0, axis=1)
-    noise, total = np.where(told[:, None], noise, 1.0), np.where(told[:, None], total, 1.0)
-    # Fisher's sum over groups: each ratio is F(2, 2 width - 2), whose tail is closed.
+    noisy = np.all(noise > 0, axis=1)
+    noise, total = np.where(noisy[:, None], noise, 1.0), np.where(noisy[:, None], total, 1.0)
+    # Fisher's sum over groups: each ratio is F(2, 2 width - 2), with a tail in closed form.
     tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
     statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)), axis=1)
     beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
     return (
-        np.where(told, np.maximum(beyond, 0.0), 0.0),
-        np.where(told, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
+        np.where(noisy, np.maximum(beyond, 0.0), 0.0),
+        np.where(noisy, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
     )
 
 
 def _followed(
-    stimulus: Complex,
-    answers: Complex,
-    *,
-    samples: int,
-    delays: Real,
-    band: tuple[float, float],
+    stimulus: Complex, answers: Complex, *, samples: int, delays: Real, band: tuple[float, float]
 ) -> tuple[Real, Real, Real, int]:
-    """Return what one gain in each group of neighbouring bins explains of each answer.
+    """Explain each answer by one gain from the input in each group of neighbouring bins.
 
-    These are the power of the input in each group, (g,), the power of each answer that the gain
-    explains, all of its power, both (k, g), and the number of bins in a group. There are no groups
-    where the band has too few bins.
+    Returned are the power of the input in each group, (g,), the explained and the total power of
+    each answer, both (k, g), and the number of bins in a group. A band with too few bins has no
+    groups.
     """
     count, n = answers.shape[0], samples
     first = max(int(np.ceil(band[0] * n)), 1)
@@ -163,13 +148,12 @@ def _followed(
 def unexplained_response(
     u: Real, y: Real, residual: Real, *, delay: float, band: tuple[float, float]
 ) -> float:
-    """Share of the response (r.m.s. over frequency) that the residual still holds.
+    """Share of the response (r.m.s. over frequency) that is still in the residual, from 0 to 1.
 
-    A sweep inside limits moves most at its low end, so that a model may leave out two thirds of
-    the response at the high end and still explain 99 % of the output's power. Here every group of
-    bins counts alike. What noise alone would give the residual, twice over, is taken off. 0 where
-    nothing follows the input, 1 where all of the response is left over. Delay and band are as for
-    `misfit`.
+    A sweep within limits moves most at its low end, so a model may miss two thirds of the response
+    at the high end and still explain 99 % of the output's power. Here every group of bins has the
+    same weight. Twice the share that noise alone would explain is subtracted. Delay and band are
+    as for `misfit`.
 
     Examples
     --------
@@ -179,17 +163,12 @@ def unexplained_response(
     >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
     0.1
     """
+    answers, delays = np.asarray(scipy.fft.rfft(np.stack([y, residual]))), np.full(2, delay)
     power, taken, total, width = _followed(
-        transform_of(u),
-        np.asarray(scipy.fft.rfft(np.stack([y, residual]))),
-        samples=u.size,
-        delays=np.full(2, delay),
-        band=band,
+        transform_of(u), answers, samples=u.size, delays=delays, band=band
     )
-    seen = power > 0.0
-    if not seen.any():
-        return 0.0
+    excited = power > 0.0
     noise = np.maximum(total - taken, 0.0) / (width - 1)
-    explained, left = taken[0], np.maximum(taken - 2.0 * noise, 0.0)[1]
-    gains = np.sum(explained[seen] / power[seen])
-    return float(np.sqrt(np.sum(left[seen] / power[seen]) / gains)) if gains > 0.0 else 0.0
+    missed = np.maximum(taken - 2.0 * noise, 0.0)[1, excited] / power[excited]
+    gains = np.sum(taken[0, excited] / power[excited])
+    return float(np.sqrt(np.sum(missed) / gains)) if gains > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Spectra of an input that several steps share."""
+"""Spectra of an input, shared by several steps."""
 
 from functools import partial
 
@@ -11,7 +11,7 @@ from hmpim.identify.kept import kept
 __all__ = ["transform_of", "windowed_power"]
 
 _WEIGHTS = np.array([0.35875, -0.244145, 0.07064, -0.00584])
-"""Weights that a Blackman-Harris window gives to a bin and to each of three on either side."""
+"""Weights by a Blackman-Harris window of a bin and each of three on either side."""
 
 
 @partial(kept, long=True)
@@ -22,7 +22,7 @@ def transform_of(u: Real) -> Complex:
 
 @partial(kept, long=True)
 def windowed_power(u: Real) -> Real:
-    """Return the power in each bin after a Blackman-Harris window, without that of a constant.
+    """Return the power in each bin after a Blackman-Harris window, without that of the mean.
 
     The window is a sum of four cosines, so a bin becomes a weighted sum of itself and three bins on
     either side.

@@ -28,7 +28,7 @@ _BLOCK = 16_384
 def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) -> Real:
     """Biased autocovariance of residuals, (..., n), at lags 0..lags, shape (..., lags + 1).
 
-    `spectra`, (..., n // 2 + 1), are their transforms, where they are known.
+    `spectra`, (..., n // 2 + 1), are their transforms, if known.
 
     Examples
     --------
@@ -38,18 +38,16 @@ def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) ->
     n = residual.shape[-1]
     if spectra is not None:
         r = scipy.fft.irfft(spectra.real**2 + spectra.imag**2, n)[..., : lags + 1]
-        for k in range(1, lags + 1):  # less what the end meets at the beginning
+        for k in range(1, lags + 1):  # less the products of the end and the beginning
             r[..., k] -= np.vecdot(residual[..., :k], residual[..., n - k :])
         return np.asarray(r / n)
-    if lags <= _FEW_LAGS:  # block by block, each near at hand for all lags
+    if lags <= _FEW_LAGS:  # block by block, to stay in the cache for all lags
         r = np.zeros((*residual.shape[:-1], lags + 1))
         for row in np.ndindex(residual.shape[:-1]):
+            padded = np.append(residual[row], np.zeros(lags))
             for start in range(0, n, _BLOCK):
                 block = residual[row][start : start + _BLOCK]
-                followed = residual[row][start : start + block.size + lags]
-                if followed.size < block.size + lags:  # nothing comes after the last
-                    followed = np.append(followed, np.zeros(block.size + lags - followed.size))
-                r[row] += np.correlate(followed, block)
+                r[row] += np.correlate(padded[start : start + block.size + lags], block)
         return np.asarray(r / n)
     length = scipy.fft.next_fast_len(n + lags + 1, real=True)
     power = np.abs(scipy.fft.rfft(residual, length)) ** 2
@@ -64,7 +62,7 @@ def is_white(residual: Real) -> bool:
 
 @kept
 def is_steady(residual: Real) -> bool:
-    """Whether white noise keeps its level, as far as its squares say (McLeod and Li, 1983).
+    """Whether white noise keeps its level, by a test of its squares (McLeod and Li, 1983).
 
     The squares of noise that is louder for a while, or where the output moves fast, are
     correlated (J. Time Series Anal. 4). Samples of 0 do not count.
@@ -75,9 +73,7 @@ def is_steady(residual: Real) -> bool:
     >>> is_steady(noise), is_steady(noise * np.linspace(0.2, 2.0, 1000))
     (True, False)
     """
-    counted = residual != 0.0
-    squares = squares_of(residual)
-    return not _correlated(np.where(counted, squares - 1.0, 0.0))
+    return not _correlated(np.where(residual != 0.0, squares_of(residual) - 1.0, 0.0))
 
 
 def squares_of(residual: Real) -> Real:
@@ -91,12 +87,12 @@ def squares_of(residual: Real) -> Real:
 def are_white(residuals: Real, spectra: Complex | None = None) -> Mask:
     """Ljung-Box test (Biometrika 65, 1978) over 25 lags.
 
-    Each lag's covariance scatters more where loud samples meet loud ones; noise whose level
-    changes is white if it passes with that counted (F. X. Diebold, 1986: Testing for serial
-    correlation in the presence of ARCH). White noise is called coloured at the rate `FALSE_ALARM`.
+    A changing level increases the scatter of each lag's covariance; such noise is white if it
+    passes with its own scatter (F. X. Diebold, 1986: Testing for serial correlation in the
+    presence of ARCH). White noise is called coloured at the rate `FALSE_ALARM`.
 
-    Of the residuals, (..., n), samples that do not count are left out or 0. `spectra`,
-    (..., n // 2 + 1), are their transforms, where they are known.
+    Samples of the residuals, (..., n), that do not count are omitted or 0. `spectra`,
+    (..., n // 2 + 1), are their transforms, if known.
 
     Examples
     --------
@@ -118,10 +114,10 @@ def _correlated(residuals: Real, spectra: Complex | None = None, *, steady: bool
 
 
 def ljung_box(residuals: Real, spectra: Complex | None = None, *, steady: bool = True) -> Real:
-    """Probability of a Ljung-Box statistic as great over 25 lags, were the residuals white.
+    """Probability of so great a Ljung-Box statistic over 25 lags, if the residuals were white.
 
-    Of the residuals, (..., n), samples that do not count are 0; of one of zeros alone, it is 1.
-    Where the level is not taken for steady, each lag has its own scatter.
+    Samples of the residuals, (..., n), that do not count are 0; for zeros alone it is 1. If the
+    level is not assumed `steady`, each lag has its own scatter.
 
     Examples
     --------
@@ -137,12 +133,12 @@ def ljung_box(residuals: Real, spectra: Complex | None = None, *, steady: bool =
     r = autocovariance(residuals, lags, spectra)
     power = np.where(r[..., :1] > 0, r[..., :1], 1.0)
     rho = (r[..., 1:] / power) ** 2
-    told = np.asarray(np.count_nonzero(residuals, axis=-1))[..., None]
+    count = np.asarray(np.count_nonzero(residuals, axis=-1))[..., None]
     if not steady:
-        scatter = autocovariance(residuals**2 / power, lags)[..., 1:]  # also of how few are told
-        rho, told = rho / np.where(scatter > 0, scatter, 1.0), np.full_like(told, n)
-    pairs = np.maximum(told - np.arange(1, lags + 1), 1)
-    statistic = np.sum(told * (told + 2) * rho / pairs, axis=-1)
+        scatter = autocovariance(residuals**2 / power, lags)[..., 1:]  # smaller if few count
+        rho, count = rho / np.where(scatter > 0, scatter, 1.0), np.full_like(count, n)
+    pairs = np.maximum(count - np.arange(1, lags + 1), 1)
+    statistic = np.sum(count * (count + 2) * rho / pairs, axis=-1)
     return np.where(r[..., 0] > 0, scipy.special.chdtrc(lags, statistic), 1.0)
 
 
@@ -150,8 +146,8 @@ def ljung_box(residuals: Real, spectra: Complex | None = None, *, steady: bool =
 def effective_share(residual: Real) -> float:
     """Independent samples per sample: 1 for white noise, less for coloured.
 
-    1 / (1 + 2 Σ ρ²), the share that holds for estimates of power (Bartlett, 1946), over
-    the lags at which the correlation stands out of its own scatter.
+    1 / (1 + 2 Σ ρ²), the share for estimates of power (Bartlett, 1946), over the lags with a
+    significant correlation.
     """
     lags = min(200, residual.size // 4)
     if is_white(residual) or lags < 1:
