@@ -1,13 +1,14 @@
-"""One output, several inputs at once: each pair's fit with the others taken out.
+"""One output, several inputs at once: each pair's fit, with the others' contributions subtracted.
 
-The input that moves the output most is fitted as if alone; others join as long as one explains
-much of what is left over, each with its own beginning and assumption between the samples. They are
-fitted in turns, each to what the others leave, until moving all at once gains little. What is weak
-beside them (`hmpim.identify.coupling.weak`) is fitted with the noise whitened.
-Then all pairs are moved at once, and only then is each coupling tested, the others allowed to take
-over: of two inputs that are alike at some frequencies, the first took a share of the other's
-coupling, which then looked like none. The error bars come from all pairs' derivatives together, so
-that inputs that resemble each other widen them.
+The input that moves the output most is fitted as if alone. Others join as long as one explains a
+large part of the residual, each with its own beginning and assumption between the samples. They are
+fitted in turns, each to the output without the others, until moving all at once gains little. Weak
+ones (`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
+
+Then all pairs are moved at once, and only then is each coupling tested, with the others free: of
+two inputs that are alike at some frequencies, the first may have explained a share of the other's
+coupling. The error bars come from all pairs' derivatives together, so inputs that resemble each
+other widen them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -44,33 +45,28 @@ from hmpim.record import Intersample
 __all__ = ["OutputFit", "fit_together", "set_free"]
 
 _TURNS = 3
-"""How often the strong inputs are fitted, each with the others known."""
+"""Times that the strong inputs are fitted, each with the others known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OutputFit:
-    """Fits of one output to each input; by default of an output to its one input."""
+    """Fits of one output to each input; by default, to its only input."""
 
-    # one for each input; its output is what the other inputs leave over. One that the output does
-    # not follow at all is not `related`.
+    # One for each input, to the output without the other inputs' contributions; not `related` if
+    # the output does not follow the input at all.
     fits: tuple[JointFit, ...]
-    # (p_i, p_i): of each fit's parameters, all fits considered together
-    covariances: tuple[Real, ...] = ()
-    # whether the input's contribution is large beside the output, not a coupling
-    strong: tuple[bool, ...] = (True,)
-    # delay and lag of couplings of no more than first order
-    lags: tuple[Lag | None, ...] = (None,)
-    # the bias's drift; each fit's output is without it
-    drifting: Drifting | None = None
-    asked: int = 0  # the input beside which it was weighed
-    humming: Humming | None = None  # its hum, likewise
-    steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
-    # what is known of a gain that changes, of an output to one input
-    gaining: GainChange | None = None
+    covariances: tuple[Real, ...] = ()  # (p_i, p_i): of each fit's parameters, with all fits free
+    strong: tuple[bool, ...] = (True,)  # whether the input's contribution is large, not a coupling
+    lags: tuple[Lag | None, ...] = (None,)  # delay and lag of couplings of at most first order
+    drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
+    asked: int = 0  # the input with which the drift was fitted
+    humming: Humming | None = None  # mains hum; each fit's output is without it
+    steady: Real | None = None  # (n,): with a drift, the prediction of a fit with a constant bias
+    gaining: GainChange | None = None  # a gain that changes, with one input only
 
     @property
     def prediction(self) -> Real:
-        """What all inputs together predict of the output, bias and drift included, shape (n,)."""
+        """Output predicted from all inputs, with bias and drift, shape (n,)."""
         first = next((fit for fit in self.fits if fit.related), self.fits[0]).best.fit
         total: Real = np.full(first.prediction.size, first.linear[-1])
         for fit in self.fits:
@@ -80,7 +76,7 @@ class OutputFit:
 
     @property
     def slow(self) -> int | None:
-        """An input whose fit may have taken a drift for its own; None where there is none."""
+        """An input whose fit may explain a drift; None without one."""
         for i, fit in enumerate(self.fits):
             if fit.related and self.strong[i] and (spans_record(fit.best.fit) or fit.lingers):
                 return i
@@ -94,7 +90,7 @@ class OutputFit:
 
     @property
     def disturbance(self) -> Real | None:
-        """What moves the output beside the model, shape (n,): drift, hum, a change of the gain."""
+        """Output motion that the model does not cause, (n,): drift, hum, a change of the gain."""
         trends = [one.trend for one in (self.drifting, self.humming) if one is not None]
         if self.gaining is not None and self.gaining.taken:
             trends.append(self.gaining.trend)
@@ -126,53 +122,52 @@ def fit_together(
     valid, known, intersample, structures
         As for `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together.
     alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
-        Inputs that are not told apart, and the bins at which they are not. There a coupling is
-        not told from what the stronger one's model lacks.
+        Inputs that cannot be distinguished, and the bins where they cannot. There, a coupling
+        cannot be distinguished from an error of the stronger input's model.
     nuisance : ndarray, shape (k, n), optional
-        Rows beside the bias that enter linearly, such as a drift's.
+        More rows that enter linearly, such as a drift's.
     aside : mapping of int to JointFit
-        Inputs that are not asked, each with its fit, which is not related.
+        Inputs to leave out, each with its unrelated fit.
     drifts : callable, optional
-        Fits plain dynamics with a drift, given the input that leads and its plain fit, where what
-        is strong leaves more than white noise: richer dynamics may take a drift for their own.
-        What it returns is taken, unless it is None.
+        Fits plain dynamics with a drift, given the leading input and its plain fit. Called if the
+        strong inputs do not leave white noise, as richer dynamics may explain a drift. Its value is
+        returned, unless it is None.
     briefly : bool
-        Whether plain dynamics of what is strong are all that is fitted; the input that leads is
-        then all that is returned.
+        Whether to fit only plain dynamics of strong inputs, and return only the leading input's.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
+    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, excluded=aside)
     _lead(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
     if briefly:
         pairs.refine(pairs.kept, None)
         return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
-    if drifts is not None and whitening_of(pairs.left()) is not None:
+    if drifts is not None and whitening_of(pairs.residual()) is not None:
         drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
             return drifting
-    asked = pairs.cost
+    least = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
         before = pairs.structures
         _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
-        left = pairs.cost
+        cost = pairs.cost
         pairs.refine(pairs.kept, None)
-        clearer = pairs.cost * TWICE < asked
+        clearer = pairs.cost * TWICE < least
         if clearer:
             _join(inputs, pairs, plainly)
-            asked = pairs.cost
+            least = pairs.cost
         others = pairs.structures != before
         if others or clearer:
             _fit_couplings(inputs, pairs, plain)
             pairs.refine(pairs.kept, None)
         simpler = pairs.simplify()
-        if not others and not simpler and pairs.cost * TWICE > left:
-            break  # else each was fitted to the wrong rest
+        if not others and not simpler and pairs.cost * TWICE > cost:
+            break  # otherwise each was fitted with wrong contributions of the others
     if pairs.reopen():
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
         _fit_couplings(inputs, pairs, plain)
@@ -183,21 +178,15 @@ def fit_together(
 
 
 def set_free(
-    fitted: OutputFit, inputs: list[Real], y: Real, asked: int, nuisance: Real | None
+    fitted: OutputFit, inputs: list[Real], y: Real, moving: int, nuisance: Real | None
 ) -> OutputFit | None:
-    """The same dynamics from a state that is free; None unless that leaves white noise.
+    """Fit the same dynamics with a free initial state; None unless that leaves white noise.
 
-    Parameters
-    ----------
-    fitted : OutputFit
-        As it ended beside other rows.
-    inputs, y, nuisance
-        As for `fit_together`.
-    asked : int
-        The input that may have moved before the record; others may if they move from its start.
+    `fitted` is a fit with other rows; `inputs`, `y` and `nuisance` are as for `fit_together`. The
+    input `moving` may have moved before the record, others only if they move from its start.
     """
     fits = {j: fit for j, fit in enumerate(fitted.fits) if fit.related}
-    if asked not in fits or fits[asked].best.fit.structure.integrators:
+    if moving not in fits or fits[moving].best.fit.structure.integrators:
         return None
     valid = common(fit.problem.valid for fit in fits.values())
     latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
@@ -206,70 +195,69 @@ def set_free(
         return None
 
     def freed(j: int, fit: JointFit) -> JointFit:
-        moves = j == asked or in_motion(inputs[j])
+        moves = j == moving or in_motion(inputs[j])
         begins = counted.begins if moves else None
         problem = replace(fit.problem, valid=counted.valid, nuisance=nuisance, begins=begins)
-        beside = np.zeros(0 if nuisance is None else len(nuisance))
-        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=beside))
+        weights = np.zeros(0 if nuisance is None else len(nuisance))
+        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
         first = counted.first or 0
         return replace(fit, problem=problem, best=best, trials=(best,), forgotten=first)
 
     strong = [j for j, one in enumerate(fitted.strong) if one]
-    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), aside={})
+    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), excluded={})
     for j, fit in enumerate(fitted.fits):
         pairs.put(j, freed(j, fit))
     pairs.refine(pairs.kept, None)
-    found = pairs.fits[asked]
+    found = pairs.fits[moving]
     if not found.best.fit.is_white:
         washed = washed_out(found.problem, found.best.fit)
         if washed is None:
             return None
         best = replace(found.best, fit=washed)
-        pairs.put(asked, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
+        pairs.put(moving, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
         pairs.refine(pairs.kept, None)
-    return _moved_at_once(pairs) if pairs.fits[asked].best.fit.is_white else None
+    return _moved_at_once(pairs) if pairs.fits[moving].best.fit.is_white else None
 
 
 def _moved_at_once(pairs: Pairs) -> OutputFit:
-    """All pairs moved with the noise whitened until none is left out, with the errors of all."""
-    whitening = whitening_of(pairs.left())
+    """Move all pairs at once, noise whitened, until no coupling is dropped; add the error bars."""
+    whitening = whitening_of(pairs.residual())
     if whitening is not None:
         pairs.refine(pairs.kept, whitening)
     while pairs.together(whitening):
         pairs.refine(pairs.kept, whitening)
-    told: dict[int, Real] = {}
+    errors: dict[int, Real] = {}
     lags: dict[int, Lag | None] = {}
     fits = [pairs.fits[j] for j in pairs.kept]
     if fits:
         problem, blocks, bias = derivatives(fits, whitening)
-        told = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
+        errors = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
     for k, j in enumerate(pairs.kept):
         if j not in pairs.strong:
             lags[j] = own_lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :], bias])
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
-        covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),
+        covariances=tuple(errors.get(j, np.zeros((0, 0))) for j in everyone),
         strong=tuple(j in pairs.strong for j in everyone),
         lags=tuple(lags.get(j) for j in everyone),
     )
 
 
 def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, each strong input to what all others leave over, unless that is as before."""
+    """Fit each strong input, in place, to the output without the others, if that has changed."""
     for i in pairs.strong:
         rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
-        if not pairs.is_settled(i, rest, counted):
+        if pairs.is_new(i, rest, counted):
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
-            pairs.settle(i, rest, counted)
 
 
 def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, the input that the output follows most."""
+    """Fit the input that the output follows most, in place."""
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
-    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once
+    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once only
     tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
     pairs.put(i, tried[i])
@@ -277,7 +265,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, inputs that much of what is left over follows, the strongest first."""
+    """Fit inputs that explain a large part of the residual, in place, the strongest first."""
     tried: dict[int, JointFit] = {}
     share, summed = _shares(inputs, pairs)
     while share:
@@ -294,20 +282,19 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
-            tried, (share, summed) = {}, _shares(inputs, pairs)  # what is left is clearer now
+            tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
 
 
 def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
-    """Amplitude (r.m.s.) that correlates with an input, or its sum, where it is much of the rest.
+    """Amplitude (r.m.s.) that each input, or its sum, explains, if it is much of the residual.
 
-    And the inputs of which it is the sum alone.
-    Friction correlates with an input that does not cause it; what follows one does so over all its
-    band.
+    Also the inputs of which only the sum does. Friction correlates with an input that does not
+    cause it; a response to an input follows it over all its band.
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
     if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
-        counted = pairs.valid  # nothing is told of what is hardly seen
+        counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
     sums: set[int] = set()
@@ -327,9 +314,9 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
 
 
 def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
-    """Amplitude (r.m.s.) of an output that correlates with an input's sum; 0 if by chance.
+    """Amplitude (r.m.s.) that correlates with an input's sum; 0 if it may be by chance.
 
-    A sum shows the input in its increments, which of a drift are small.
+    The increments of such a response follow the input, and those of a drift are small.
     """
     moves = np.diff(rest, prepend=rest[0])
     if misfit_at_any_lag(u, moves, excited_band(u, 1.0)).probability >= rare:
@@ -344,28 +331,28 @@ def _likely(share: Mapping[int, float]) -> list[int]:
 
 
 def _is_large(fit: JointFit) -> bool:
-    """Whether an input is much of what the others leave over."""
+    """Whether an input explains a large part of the output without the others."""
     counts = slice(None) if fit.problem.valid is None else fit.problem.valid
-    left = fit.problem.y - constant_of(fit)
-    return float(np.std(contribution(fit)[counts])) > PART * float(np.std(left[counts]))
+    rest = fit.problem.y - constant_of(fit)
+    return float(np.std(contribution(fit)[counts])) > PART * float(np.std(rest[counts]))
 
 
 def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
-    """Inputs that are asked and not strong."""
-    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
+    """Inputs that are neither strong nor excluded."""
+    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
 
 
 def _is_followed(tried: JointFit) -> bool:
-    """Whether what is left over follows an input, and not too late.
+    """Whether the output follows an input, and not too late.
 
-    A pole as slow as the record explains a drift as well, and what answers late enough to leave
-    out most of the record explains what the stronger inputs' models lack, such as friction.
+    A pole as slow as the record also explains a drift. A response so late that it leaves out most
+    of the record explains errors of the stronger inputs' models, such as friction.
     """
     return not spans_record(tried.best.fit) and _is_in_time(tried)
 
 
 def _is_summed(u: Real, tried: JointFit, fitted: Callable[..., JointFit]) -> bool:
-    """Whether what is left over follows the sum of an input: a drift explains less."""
+    """Whether the output follows the sum of an input: a drift explains less."""
     if not _is_in_time(tried):
         return False
     problem = tried.problem
@@ -376,7 +363,7 @@ def _is_summed(u: Real, tried: JointFit, fitted: Callable[..., JointFit]) -> boo
 
 
 def _is_in_time(tried: JointFit) -> bool:
-    """Whether an output answers an input, over most of the record."""
+    """Whether an output responds to an input, over most of the record."""
     problem = tried.problem
     late = max(tried.best.fit.delay, problem.begins or 0)
     return tried.related and bool(late < MOST * problem.y.size)
@@ -389,7 +376,7 @@ def _follows_at_all(u: Real, y: Real) -> float:
 
 
 def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[StructureName, ...]) -> None:
-    """Fit, in place, all that is weak, the strongest first."""
+    """Fit all weak couplings, in place, the strongest first."""
     fits = pairs.fits
     best = fits[pairs.strong[0]]
     mode = best.best.intersample
@@ -397,13 +384,13 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     if not weak:
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
-    rest = pairs.left()
+    rest = pairs.residual()
     whitening = whitening_of(rest)
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
-    for names in (structures,) if known else (roughly, structures):  # each whitened anew
+    for names in (structures,) if known else (roughly, structures):  # whitened anew each time
         for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], rest)):
             problem = Problem(
                 source=sources[j],
@@ -415,8 +402,8 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
             )
             fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
             pairs.put(j, fit)
-        # Not before all are right is one of them tested: alike, they take each other's share.
+        # Test none before all are fitted: inputs that are alike explain each other's share.
         while pairs.together(whitening, drop=names is structures):
             pass
-        rest = pairs.left()
+        rest = pairs.residual()
         whitening = whitening_of(rest)
