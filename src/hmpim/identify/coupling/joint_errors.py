@@ -6,14 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.weak import Lag, lag_of
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 
-__all__ = ["common", "covariances", "derivatives", "gained_by", "own_lag"]
+__all__ = ["common", "covariances", "derivatives", "gained_by"]
 
 _UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not determine a direction."""
@@ -37,7 +36,7 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
         whitening=whitening,
         begins=None,
     )
-    ones, blocks, others = np.ones((1, problem.y.size)), [], []
+    blocks, others, bias = [], [], problem.masked(np.ones((1, problem.y.size)))
     for fit in fits:
         own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
         part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
@@ -47,23 +46,10 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
     if problem.nuisance is not None:
         others.append(problem.nuisance)
     given = problem.masked(np.vstack(others))
-    bias = problem.masked(ones)
     if given.shape[0]:
         edges = np.cumsum([block.shape[0] for block in blocks])
         *blocks, bias = np.split(without(np.vstack([*blocks, bias]), given), edges)
     return problem, blocks, bias
-
-
-def own_lag(problem: Problem, pair: JointFit, others: list[Real]) -> Lag | None:
-    """Delay and lag of a pair of no more than first order.
-
-    `others` are the derivatives of the other pairs and by the bias.
-    """
-    fit = pair.best.fit
-    if fit.structure.name not in ("static", "first_order"):
-        return None
-    own = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
-    return lag_of(own, fit, np.vstack(others))
 
 
 def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real) -> list[Real]:

@@ -19,10 +19,10 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
+from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.left import misfit_at_any_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
-from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
+from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -111,29 +111,18 @@ def fit_together(
     drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
     briefly: bool = False,
 ) -> OutputFit:
-    """Fit one output to several inputs.
+    """Fit one output, (n,), to several inputs.
 
-    Parameters
-    ----------
-    inputs : list of ndarray, shape (n,)
-        Uniform samples of each input.
-    y : ndarray, shape (n,)
-        Uniform samples of the output.
-    valid, known, intersample, structures
-        As for `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together.
-    alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
-        Inputs that cannot be distinguished, and the bins where they cannot. There, a coupling
-        cannot be distinguished from an error of the stronger input's model.
-    nuisance : ndarray, shape (k, n), optional
-        More rows that enter linearly, such as a drift's.
-    aside : mapping of int to JointFit
-        Inputs to leave out, each with its unrelated fit.
-    drifts : callable, optional
-        Fits plain dynamics with a drift, given the leading input and its plain fit. Called if the
-        strong inputs do not leave white noise, as richer dynamics may explain a drift. Its value is
-        returned, unless it is None.
-    briefly : bool
-        Whether to fit only plain dynamics of strong inputs, and return only the leading input's.
+    `valid`, `known`, `intersample` and `structures` are as for
+    `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together. `alike` names
+    inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
+    coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
+    enter linearly, such as a drift's. Inputs `aside` are left out; each has its unrelated fit.
+
+    If the strong inputs do not leave white noise, richer dynamics may explain a drift: `drifts`
+    then fits plain dynamics with one, given the leading input and its plain fit, and its value is
+    returned unless it is None. If `briefly`, only strong inputs are fitted, with plain dynamics,
+    and only the leading input's fit is returned.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -234,7 +223,8 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
         errors = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
     for k, j in enumerate(pairs.kept):
         if j not in pairs.strong:
-            lags[j] = own_lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :], bias])
+            others = np.vstack([*blocks[:k], *blocks[k + 1 :], bias])
+            lags[j] = lag_of(problem, fits[k], others)
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
@@ -276,9 +266,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and (
-            _is_followed(tried[i]) or (i in summed and _is_summed(inputs[i], tried[i], fitted))
-        ):
+        if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
@@ -342,31 +330,24 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
     return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
 
 
-def _is_followed(tried: JointFit) -> bool:
-    """Whether the output follows an input, and not too late.
+def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
+    """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
-    A pole as slow as the record also explains a drift. A response so late that it leaves out most
-    of the record explains errors of the stronger inputs' models, such as friction.
+    A response so late that it leaves out most of the record explains errors of the stronger inputs'
+    models, such as friction. A pole as slow as the record also explains a drift: it counts only
+    if a drift explains less than the sum does.
     """
-    return not spans_record(tried.best.fit) and _is_in_time(tried)
-
-
-def _is_summed(u: Real, tried: JointFit, fitted: Callable[..., JointFit]) -> bool:
-    """Whether the output follows the sum of an input: a drift explains less."""
-    if not _is_in_time(tried):
+    problem, fit = tried.problem, tried.best.fit
+    if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
         return False
-    problem = tried.problem
+    if not spans_record(fit):
+        return True
+    if not summed:
+        return False
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
-    beside = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
-    return spans_record(beside) or tried.best.fit.cost < beside.cost
-
-
-def _is_in_time(tried: JointFit) -> bool:
-    """Whether an output responds to an input, over most of the record."""
-    problem = tried.problem
-    late = max(tried.best.fit.delay, problem.begins or 0)
-    return tried.related and bool(late < MOST * problem.y.size)
+    drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
+    return spans_record(drifting) or fit.cost < drifting.cost
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

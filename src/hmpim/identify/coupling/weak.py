@@ -173,8 +173,8 @@ class Lag:
     time_constant_std: float
 
 
-def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
-    """Average the likelihood over lags of a static or first-order fit; None if no lag is possible.
+def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
+    """Average the likelihood over lags of a coupling; None if no lag is possible, or of two poles.
 
     At low frequencies, where a weak coupling is known best, a delay and a first-order lag have the
     same phase. The likeliest split between them then means little, and its error bars less: a lag
@@ -182,9 +182,13 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
     each with its own best delay (a flat prior on the lag: Sivia and Skilling, Data Analysis,
     2nd ed., Oxford 2006, ch. 3).
 
-    The problem's output is without the other inputs' contributions; `others`, (k, n), are the
-    whitened derivatives by all other parameters, which stay free.
+    The problem has the samples that count and the whitening; `others`, (k, n), are the whitened
+    derivatives by all other parameters, which stay free.
     """
+    fit = pair.best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    problem = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
     basis, _ = np.linalg.qr(others.T)
 
     def clean(rows: Real) -> Real:

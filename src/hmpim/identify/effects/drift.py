@@ -44,6 +44,9 @@ _TRIED = 16
 _FEWEST = 100
 """Fewest samples that distinguish drift from noise: six for each degree of the polynomial."""
 
+_Fitted = Callable[[Real, bool], JointFit]
+_Steadily = Callable[[JointFit], JointFit | None]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drifting:
@@ -59,9 +62,7 @@ class Drifting:
 
 
 def with_drift(
-    first: JointFit,
-    fitted: Callable[[Real, bool], JointFit],
-    steadily: Callable[[JointFit], JointFit | None],
+    first: JointFit, fitted: _Fitted, steadily: _Steadily
 ) -> tuple[JointFit, Drifting | None]:
     """Fit again with a drifting bias, if the first fit suggests one and the criterion improves.
 
@@ -98,10 +99,7 @@ def with_drift(
 
 
 def with_plain_drift(
-    problem: Problem,
-    fit: Fit,
-    fitted: Callable[[Real, bool], JointFit],
-    steadily: Callable[[JointFit], JointFit | None],
+    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily
 ) -> tuple[JointFit, Drifting | None] | None:
     """Add a drift to plain dynamics; keep it if that leaves white noise.
 
@@ -128,16 +126,35 @@ def with_plain_drift(
 
 
 def _unless_steady(
-    joint: JointFit,
-    columns: Real,
-    steadily: Callable[[JointFit], JointFit | None],
-    rival: Fit | None,
+    joint: JointFit, columns: Real, steadily: _Steadily, rival: Fit | None
 ) -> tuple[JointFit, Drifting | None]:
-    """Return the fit with a drift, or one with a constant bias that explains as much."""
+    """Return the fit with the drift subtracted, or one with a constant bias that explains as much.
+
+    The rows of the drift stay free.
+    """
     steady = steadily(joint)
     if steady and gain_by_rows(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
         return steady, None
-    drifting = _described(joint, columns, rival=rival)
+    weighed, fit = joint.weighed, joint.best.fit
+    weights = fit.nuisance[: len(columns)]
+    others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
+    slopes = without(weighed.masked(columns), others)
+    residual = weighed.innovations(fit.prediction, fit.residual)
+    errors = covariance(
+        slopes,
+        residual,
+        freedom=max(weighed.counted - slopes.shape[0] - others.shape[0], 1),
+        white=is_white(residual),
+    )
+    across = (columns[:, -1] - columns[:, 0]) / (weighed.y.size - 1)
+    drifting = Drifting(
+        joint=without_rows(joint, slice(len(columns))),
+        trend=weights @ columns,
+        steady=len(columns) == 1,
+        rate=float(across @ weights),
+        rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
+        rival=rival,
+    )
     return drifting.joint, drifting
 
 
@@ -263,27 +280,3 @@ def _settling(size: int, time_constant: float) -> Real:
     at = np.arange(size) / time_constant
     rows = np.vstack([np.exp(-at), at * np.exp(-at)])
     return np.asarray(rows - rows.mean(axis=1, keepdims=True))
-
-
-def _described(joint: JointFit, columns: Real, *, rival: Fit | None) -> Drifting:
-    """Subtract the drift from the output of a fit, and determine its rate; the rows stay free."""
-    problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
-    weights = fit.nuisance[: len(columns)]
-    others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
-    slopes = without(weighed.masked(columns), others)
-    residual = weighed.innovations(fit.prediction, fit.residual)
-    errors = covariance(
-        slopes,
-        residual,
-        freedom=max(weighed.counted - slopes.shape[0] - others.shape[0], 1),
-        white=is_white(residual),
-    )
-    across = (columns[:, -1] - columns[:, 0]) / (problem.y.size - 1)
-    return Drifting(
-        joint=without_rows(joint, slice(len(columns))),
-        trend=weights @ columns,
-        steady=len(columns) == 1,
-        rate=float(across @ weights),
-        rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
-        rival=rival,
-    )

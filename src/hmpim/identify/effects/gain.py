@@ -55,6 +55,10 @@ _ALIKE = 1e-8
 """Least share of a row's power that the fit's other derivatives must not explain."""
 
 
+_Fitted = Callable[[Real, Real, bool], JointFit]
+_Share = Callable[[Problem, Fit], float]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GainChange:
     """A fit with a gain that changes."""
@@ -103,11 +107,7 @@ class Scored:
         return np.stack([shape * self.motion, (near - shape) / _PROBE * self.motion])
 
 
-def changing_gain(
-    first: JointFit,
-    fitted: Callable[[Real, Real, bool], JointFit],
-    otherwise: Callable[[Problem, Fit], float],
-) -> GainChange | None:
+def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainChange | None:
     """Test whether the gain changes, and whether that explains a rich structure.
 
     `first` has a constant gain. `fitted` makes the joint fit to another output with more rows, of
@@ -171,9 +171,7 @@ def changing_gain(
     )
 
 
-def _first_scores(
-    first: JointFit, otherwise: Callable[[Problem, Fit], float]
-) -> tuple[tuple[Scored, ...], float]:
+def _first_scores(first: JointFit, otherwise: _Share) -> tuple[tuple[Scored, ...], float]:
     """Scores to start from, none if no test is significant; and the share that they explain."""
     count, best = first.weighed.counted * first.weighed_share, first.best.fit
     own = scored(first.weighed, best, count)
@@ -209,11 +207,7 @@ class _Settled:
 
 
 def _tried(
-    first: JointFit,
-    begin: tuple[Scored, ...],
-    fitted: Callable[[Real, Real, bool], JointFit],
-    *,
-    hopeless: float,
+    first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted, *, hopeless: float
 ) -> list[_Settled]:
     """Plain fits with a steady change and one that settles, without those that cannot win."""
     steady = [score for score in begin if not score.rate]
@@ -227,9 +221,7 @@ def _tried(
     return found
 
 
-def _scores_of_plain(
-    first: JointFit, count: float, otherwise: Callable[[Problem, Fit], float]
-) -> tuple[Scored, ...]:
+def _scores_of_plain(first: JointFit, count: float, otherwise: _Share) -> tuple[Scored, ...]:
     """Scores of the plain fit that, with a changing gain, may be as likely as the rich one."""
     best, problem = first.best, first.weighed
     least, most, lead = TWICE * best.fit.objective, 0.0, best.fit
@@ -253,7 +245,7 @@ def _scores_of_plain(
 def _settled(
     first: JointFit,
     begin: Scored,
-    fitted: Callable[[Real, Real, bool], JointFit],
+    fitted: _Fitted,
     *,
     hopeless: float = np.inf,
     plainly: bool = True,
@@ -263,15 +255,17 @@ def _settled(
     The output is divided by the gain so far, so that the row has little left to explain. Its exact
     form, and the assumption between the samples, then do not matter.
     """
-    y, score, rest = first.problem.y, begin, _rest(first.problem, first.best.fit)
-    spread = _STEP
+    y, score, spread = first.problem.y, begin, _STEP
+    fit, problem = first.best.fit, first.problem
     for turn in range(_ROUNDS):
         course = 1.0 + score.change * score.shape
         if course.min() < _LEAST:
             return None
-        level = rest
+        # The output at the input's initial level does not change with the gain.
+        initial = part_of(problem, fit.structure, fit.theta).level
+        level = float(fit.linear[-1] + fit.linear[0] * initial)
         joint = fitted(level + (y - level) / course, score.rows, plainly)
-        fit, rest = joint.best.fit, _rest(joint.problem, joint.best.fit)
+        fit, problem = joint.best.fit, joint.problem
         if not joint.related or fit.cost >= hopeless:
             return None
         data, constant = _undivided(joint, score.rows, y)
@@ -296,29 +290,13 @@ def _settled(
     )
 
 
-def _rest(problem: Problem, fit: Fit) -> float:
-    """Output at the input's initial level."""
-    return float(fit.linear[-1] + fit.linear[0] * part_of(problem, fit.structure, fit.theta).level)
-
-
 def scored(
     problem: Problem, fit: Fit, count: float, *, rates: tuple[float, ...] = (0.0, *_SETTLES)
 ) -> tuple[Scored, ...]:
-    """Test a fit for a gain that changes.
+    """Test a fit with a constant gain, with `count` independent samples, for a gain that changes.
 
-    Parameters
-    ----------
-    problem, fit
-        The data, and a fit to them with a constant gain.
-    count : float
-        Independent samples.
-    rates : tuple of float
-        Record lengths in time constants of the changes to test; 0 for a steady one.
-
-    Returns
-    -------
-    tuple of Scored
-        One for each shape that the fit's own parameters do not explain.
+    `rates` are the record lengths in time constants of the changes to test; 0 for a steady one.
+    There is a score for each shape that the fit's own parameters do not explain.
     """
     part = part_of(problem, fit.structure, fit.theta)
     # From the input's initial level: a change of gain at an offset is a drift of the bias.

@@ -24,13 +24,7 @@ from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
 from hmpim.tables import html_table, shortened
 
-__all__ = [
-    "LevelComparison",
-    "Levels",
-    "Trend",
-    "compare_levels",
-    "identify_levels",
-]
+__all__ = ["LevelComparison", "Levels", "Trend", "compare_levels", "identify_levels"]
 
 _COMPARED = (
     "natural_frequency",

@@ -101,8 +101,17 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
     response, scatter = _averaged(found)
     identified = tuple(pair for pair in found if pair.verdict != "not_identifiable")
     noise, unmodelled, probability = _split(identified)
-    recurs = unmodelled if probability is not None and probability < FALSE_ALARM else None
-    said = (*_unlike(found, identified), *_doubts(parameters, found[0].output), *_recurring(recurs))
+    said = [*_unlike(found, identified), *_doubts(parameters, found[0].output)]
+    if unmodelled and probability is not None and probability < FALSE_ALARM:
+        said.append(
+            Finding(
+                code="unmodelled",
+                message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
+                "every repeat, so it is not noise. Look at the residual beside the stimulus.",
+                severity="doubt",
+                parameters=MODELLED,
+            )
+        )
     return RepeatedPair(
         input=found[0].input,
         output=found[0].output,
@@ -118,7 +127,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         noise_std=noise,
         unmodelled=unmodelled,
         unmodelled_probability=probability,
-        findings=said,
+        findings=tuple(said),
     )
 
 
@@ -141,18 +150,6 @@ def _unlike(
             "The records barely distinguish them; state one with structures=.",
             severity="doubt",
             parameters=PHASE_SPLIT,
-        )
-
-
-def _recurring(unmodelled: float | None) -> Iterator[Finding]:
-    """Report the r.m.s. part of the residual that recurs in every repeat."""
-    if unmodelled:
-        yield Finding(
-            code="unmodelled",
-            message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
-            "every repeat, so it is not noise. Look at the residual beside the stimulus.",
-            severity="doubt",
-            parameters=MODELLED,
         )
 
 
@@ -224,18 +221,17 @@ def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> Iterator[Fi
     ):
         found = [p for p in apart if (p.probability < FALSE_ALARM) == (how == "more")]
         if found:
+            ratios = [
+                f"{in_words(p.name)} {float(np.sqrt(p.chi_squared / p.freedom)):.3g} times"
+                for p in found
+            ]
             yield Finding(
                 code="scatter",
                 message=f"From repeat to repeat {output!r} scatters {how} than the stated errors "
-                f"allow: {', '.join(map(_times, found))} the stated error. {cause}",
+                f"allow: {', '.join(ratios)} the stated error. {cause}",
                 severity="doubt",
                 parameters=tuple(p.name for p in found),
             )
-
-
-def _times(parameter: RepeatedParameter) -> str:
-    ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
-    return f"{in_words(parameter.name)} {ratio:.3g} times"
 
 
 def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse, float]:
