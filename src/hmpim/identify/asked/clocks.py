@@ -53,7 +53,7 @@ def settled_between(
     plain structures only if its second argument is true.
     """
     names = ", ".join(repr(signal.name) for signal in aligned.inputs)
-    said = Finding(
+    finding = Finding(
         code="held_between",
         message=(
             f"Values of {names} change between samples of the outputs. The model "
@@ -63,10 +63,10 @@ def settled_between(
         severity="info",
         parameters=(),
     )
-    others = tuple(f for f in aligned.findings if f.code != said.code)
+    others = tuple(f for f in aligned.findings if f.code != finding.code)
     corrected = _unfolded(record, aligned, identified(aligned, True))
     for _ in range(_ROUNDS):
-        found = identified(replace(corrected, findings=(*others, said)), False)
+        found = identified(replace(corrected, findings=(*others, finding)), False)
         before, corrected = corrected, _unfolded(record, aligned, found)
         if _moved_by(before, corrected) < _STILL:
             return found

@@ -94,7 +94,7 @@ def _shortest_stay(u: Real, valid: Mask) -> float:
 def recognise_software(question: Question) -> Question:
     """Try filters if rounding is the only noise, and no simpler system explains the record.
 
-    Only with one input, with all samples valid, and nothing stated about them.
+    Only for one input, with all samples valid and no assumption stated.
     """
     source, output = question.aligned.inputs[0], question.output
     if question.intersample is not None or question.swapped or question.instrument:

@@ -5,6 +5,6 @@ output_fit    one output fitted to all inputs: the strong ones, in turns, then a
 pairs         the state of that search: fits moved at once, simplified, couplings dropped
 joint_errors  error bars from the derivatives of all pairs
 weak          weak couplings one by one; delay and lag where only their sum is known
-left          whether the residual still follows an input
+residual      whether the residual still follows an input
 responses     measured response to each input, and findings on weak couplings
 """

@@ -20,8 +20,8 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
-from hmpim.identify.coupling.left import misfit_at_any_lag
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
+from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
@@ -237,7 +237,7 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
 def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit each strong input, in place, to the output without the others, if that has changed."""
     for i in pairs.strong:
-        rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
+        rest, counted = pairs.without_others(i), pairs.counted(j for j in pairs.kept if j != i)
         if pairs.is_new(i, rest, counted):
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
 

@@ -65,14 +65,9 @@ class Pairs:
         return [self.fits[i].best.fit.structure for i in self.strong]
 
     @property
-    def spread(self) -> float:
-        """R.m.s. motion of the output."""
-        return float(np.std(self.y if self.valid is None else self.y[self.valid]))
-
-    @property
     def dominant(self) -> set[int]:
         """Inputs whose motion is so large that an error of their model looks like a coupling."""
-        least = PART * self.spread
+        least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def put(self, i: int, fit: JointFit) -> None:
@@ -102,10 +97,6 @@ class Pairs:
         """Samples at which the contributions of some inputs are known."""
         return common([self.valid, *(self.masks[j] for j in some)])
 
-    def counted_by_others(self, i: int) -> Mask | None:
-        """Samples at which the contributions of all inputs but one are known."""
-        return self.counted(j for j in self.kept if j != i)
-
     def residual(self) -> Real:
         """The output without any contribution or constant; 0 where not known."""
         kept = self.kept
@@ -123,8 +114,8 @@ class Pairs:
         y = self.y if y is None else y
         begun = [self.fits[j].best.fit for j in some]
         problems, found = self._moved(some, begun, whitening=whitening, y=y)
-        for j, trial in zip(some, [self.fits[j].best for j in some], strict=True):
-            self._take(some, found, j, trial, y)
+        for j in some:
+            self._take(some, found, j, self.fits[j].best, y)
         return problems, found
 
     def _moved(
@@ -190,9 +181,9 @@ class Pairs:
                 if lost - gained < least:
                     least, chosen = lost - gained, (trial, found)
             if chosen is not None:
-                trials = [chosen[0] if j == i else self.fits[j].best for j in some]
-                for j, trial in zip(some, trials, strict=True):
-                    self._take(some, chosen[1], j, trial, self.y)
+                trial, found = chosen
+                for j in some:
+                    self._take(some, found, j, trial if j == i else self.fits[j].best, self.y)
                 simpler = True
         return simpler
 
@@ -217,10 +208,7 @@ class Pairs:
         return bool(low)
 
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
-        """Move all couplings at once; drop the least significant one if it adds nothing.
-
-        Returns whether one was dropped.
-        """
+        """Move all couplings at once; drop the weakest if it adds nothing, and return whether."""
         dominant = self.dominant
         moved = [j for j in self.kept if j not in dominant]
         weak = [j for j in moved if j not in self.strong]

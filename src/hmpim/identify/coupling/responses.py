@@ -11,8 +11,8 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.coupling.inputs import input_set
-from hmpim.identify.coupling.left import left_over
 from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.coupling.residual import misfits_of_inputs
 from hmpim.identify.coupling.weak import unsettled
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.noise.misfit import Misfit
@@ -59,7 +59,7 @@ class Responses:
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
-    """Find which inputs are distinguished.
+    """Find which inputs the record distinguishes; refuse those that it cannot.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def responses_of(
             ),
         ),
         left=cache(
-            lambda: left_over(
+            lambda: misfits_of_inputs(
                 [source.values for source in aligned.inputs],
                 joined.fits,
                 [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
@@ -162,7 +162,7 @@ def _pieces(
 
 
 def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
-    """One input's response at the frequencies where the inputs can be told apart."""
+    """One input's response at the frequencies where the inputs are distinguished."""
     own = [(m, active.index(j), m.usable) for active, m in pieces if j in active]
     return FrequencyResponse(
         frequency=np.concatenate([np.zeros(0), *(m.frequency[known] for m, _, known in own)]),
@@ -226,13 +226,13 @@ def unfound(joined: OutputFit, matrix: Responses, inputs: InputSet) -> tuple[Fin
         Finding(
             code="unfound_response",
             message=f"The residual still follows input {name!r}, whose response was not found: "
-            f"about {percent(left.share)} % of the residual's power. "
+            f"about {percent(found.share)} % of the residual's power. "
             f"Excite {name!r} more, or alone.",
             severity="doubt",
             parameters=("noise_std",),
         )
-        for name, fit, left in zip(inputs.names, joined.fits, matrix.left(), strict=True)
-        if not fit.related and left.probability < FALSE_ALARM and left.share > 2 * FEW
+        for name, fit, found in zip(inputs.names, joined.fits, matrix.left(), strict=True)
+        if not fit.related and found.probability < FALSE_ALARM and found.share > 2 * FEW
     )
 
 
@@ -356,22 +356,18 @@ def _determined(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, l
     def late(e: Estimate) -> bool:
         return not e.spread <= 0.5 / band[1]
 
-    gone: set[str] = set()
-    for name, bad in (
-        ("scale_factor", loose),
-        ("time_constant", loose),
-        ("damping_ratio", loose),
-        ("natural_frequency", beyond),
-        ("bandwidth_phase90", beyond),
-        ("bandwidth_phase90_without_delay", beyond),
-        ("bandwidth_3db", beyond),
-        ("peak_gain_db", lambda e: not e.spread <= 20 * np.log10(TWICE)),
-        ("delay", late),
-        ("delay_low_frequency", late),
-    ):
-        value: Estimate | None = getattr(p, name)
-        if value is not None and bad(value):
-            gone.add(name)
+    def uncertain(e: Estimate) -> bool:
+        return not e.spread <= 20 * np.log10(TWICE)
+
+    tests = (
+        (loose, ("scale_factor", "time_constant", "damping_ratio")),
+        (beyond, ("natural_frequency", "bandwidth_phase90")),
+        (beyond, ("bandwidth_phase90_without_delay", "bandwidth_3db")),
+        (uncertain, ("peak_gain_db",)),
+        (late, ("delay", "delay_low_frequency")),
+    )
+    known = {name: getattr(p, name) for _, names in tests for name in names}
+    gone = {n for bad, names in tests for n in names if known[n] is not None and bad(known[n])}
     if "natural_frequency" in gone:
         gone |= {"damping_ratio", "peak_gain_db"}
     if "scale_factor" in gone:

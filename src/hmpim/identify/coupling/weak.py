@@ -174,7 +174,7 @@ class Lag:
 
 
 def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
-    """Average the likelihood over lags of a coupling; None if no lag is possible, or of two poles.
+    """Average over lags of a coupling; None if it has two poles, or if no lag is possible.
 
     At low frequencies, where a weak coupling is known best, a delay and a first-order lag have the
     same phase. The likeliest split between them then means little, and its error bars less: a lag

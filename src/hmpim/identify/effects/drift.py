@@ -1,6 +1,6 @@
 """A bias that drifts: a slow function of time, fitted together with the model.
 
-It is tried if a constant bias leaves a residual that is not white, or if a rich model has a free
+It is tried if the residual with a constant bias is not white, or if a rich model has a free
 response as slow as a drift. Its shape is a polynomial, or exp(-t/T) as of a body that warms up.
 Legendre polynomials, or the exponential and its derivative with respect to T, are rows of the same
 fit, solved with bias and numerator; the error bars come from the derivatives of all.
@@ -128,10 +128,7 @@ def with_plain_drift(
 def _unless_steady(
     joint: JointFit, columns: Real, steadily: _Steadily, rival: Fit | None
 ) -> tuple[JointFit, Drifting | None]:
-    """Return the fit with the drift subtracted, or one with a constant bias that explains as much.
-
-    The rows of the drift stay free.
-    """
+    """Subtract the drift from the fit, or return one with a constant bias that explains as much."""
     steady = steadily(joint)
     if steady and gain_by_rows(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
         return steady, None

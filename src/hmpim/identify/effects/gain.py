@@ -96,10 +96,7 @@ class Scored:
 
     @property
     def rows(self) -> Real:
-        """Rows of the change, shape (k, n).
-
-        If it settles, the second one is the derivative with respect to the logarithm of its rate.
-        """
+        """Rows of the change, and of its derivative by the logarithm of its rate, (k, n)."""
         shape = self.shape
         if not self.rate:
             return (shape * self.motion)[None]
@@ -252,7 +249,7 @@ def _settled(
 ) -> _Settled | None:
     """Make the joint fit with a change of one shape; None if `hopeless` or more is its cost.
 
-    The output is divided by the gain so far, so that the row has little left to explain. Its exact
+    The output is divided by the gain so far, so that the row explains little. Its exact
     form, and the assumption between the samples, then do not matter.
     """
     y, score, spread = first.problem.y, begin, _STEP

@@ -78,10 +78,10 @@ def hum_finding(humming: Humming, fs: float, unit: str) -> Finding:
         for frequency, amplitude in zip(humming.frequencies, humming.amplitudes, strict=True)
     ]
     what = "A line is" if len(lines) == 1 else "Lines are"
-    said = lines[0] if len(lines) == 1 else ", ".join(lines[:-1]) + " and " + lines[-1]
+    text = lines[0] if len(lines) == 1 else ", ".join(lines[:-1]) + " and " + lines[-1]
     return Finding(
         code="hum",
-        message=f"{what} on the output that the input does not have: {said}. Each is fitted and "
+        message=f"{what} on the output that the input does not have: {text}. Each is fitted and "
         "removed, and the noise stated is without it. Look for mains hum or vibration.",
         severity="info",
         parameters=("noise_std",),

@@ -101,10 +101,10 @@ class Imperfections:
 
     def counting(self, valid: Mask, fs: float) -> Mask | None:
         """Samples that are valid and show the output as it was; None if all do."""
-        telling = self.telling(valid.size, fs)
+        shown = self.telling(valid.size, fs)
         if bool(valid.all()):
-            return telling
-        return valid if telling is None else np.asarray(valid & telling)
+            return shown
+        return valid if shown is None else np.asarray(valid & shown)
 
 
 def find_imperfections(
@@ -225,10 +225,7 @@ def refine(
 def _weighed_again(
     joint: JointFit, tried: list[tuple[Trial, CensoredFit]], best: Trial
 ) -> tuple[Trial, ...]:
-    """All trials, with criteria by the censored likelihood.
-
-    Trials that were not refined shift with the refined one of the same assumption on the input.
-    """
+    """All trials by the censored likelihood; the others shift with the one of their assumption."""
     again = {_kind(trial): replace(trial, fit=refined.fit) for trial, refined in tried}
     again[_kind(best)] = best
     moved = {
@@ -292,6 +289,6 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
 
 def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:
     """Samples that count, with clipped and held ones included again."""
-    telling, lost = found.telling(valid.size, fs), found.lost
-    whole = valid if telling is None else np.asarray(valid | ~telling)
+    shown, lost = found.telling(valid.size, fs), found.lost
+    whole = valid if shown is None else np.asarray(valid | ~shown)
     return whole if lost is None else np.asarray(whole & ~lost)

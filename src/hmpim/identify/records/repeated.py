@@ -175,9 +175,9 @@ class Repeats:
     def _repr_html_(self) -> str:
         """Return a table of the averages of every pair, for notebooks."""
         rows = [[pair._named, *row] for pair in self.pairs for row in pair._rows]
-        said = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
+        messages = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
         title = f"{len(self.results)} records of one stimulus"
-        return html_table(title, ["from → to", *_HEADS], rows, notes=list(said))
+        return html_table(title, ["from → to", *_HEADS], rows, notes=list(messages))
 
     def __iter__(self) -> Iterator[RepeatedPair]:
         return iter(self.pairs)

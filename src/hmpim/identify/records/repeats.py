@@ -101,9 +101,9 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
     response, scatter = _averaged(found)
     identified = tuple(pair for pair in found if pair.verdict != "not_identifiable")
     noise, unmodelled, probability = _split(identified)
-    said = [*_unlike(found, identified), *_doubts(parameters, found[0].output)]
+    findings = [*_unlike(found, identified), *_doubts(parameters, found[0].output)]
     if unmodelled and probability is not None and probability < FALSE_ALARM:
-        said.append(
+        findings.append(
             Finding(
                 code="unmodelled",
                 message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
@@ -118,7 +118,8 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         structures=tuple(pair.structure for pair in found),
         parameters=tuple(
             replace(
-                p, mean=judged_together(p.mean, _known(p.name, found), name=p.name, findings=said)
+                p,
+                mean=judged_together(p.mean, _known(p.name, found), name=p.name, findings=findings),
             )
             for p in parameters
         ),
@@ -127,7 +128,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         noise_std=noise,
         unmodelled=unmodelled,
         unmodelled_probability=probability,
-        findings=tuple(said),
+        findings=tuple(findings),
     )
 
 

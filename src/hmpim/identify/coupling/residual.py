@@ -10,7 +10,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.section_iv.correlation import likeness
 
-__all__ = ["left_over", "misfit_at_any_lag"]
+__all__ = ["misfit_at_any_lag", "misfits_of_inputs"]
 
 
 def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
@@ -35,7 +35,7 @@ def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
     )
 
 
-def left_over(
+def misfits_of_inputs(
     inputs: Sequence[Real], fits: Sequence[JointFit], bands: Sequence[tuple[float, float]]
 ) -> tuple[Misfit, ...]:
     """Test how far the residual of all inputs still follows each of them, (n,).
