@@ -340,10 +340,9 @@ def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summ
     problem, fit = tried.problem, tried.best.fit
     if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
         return False
-    if not spans_record(fit):
-        return True
-    if not summed:
-        return False
+    slow = spans_record(fit)
+    if not slow or not summed:
+        return not slow
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
     drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit

@@ -27,7 +27,7 @@ from hmpim.identify.effects.quantization import Quantization, detect_quantizatio
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.data import prepared
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of
 from hmpim.identify.worth import FEW, NEARLY, TWICE
 from hmpim.model.dynamics import Structure
@@ -60,9 +60,8 @@ class Imperfections:
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
         """Whether a clipped side or a hold appeared or vanished, or more samples are lost."""
-        if _sides(self.saturation) != _sides(before.saturation):
-            return True
-        if (self.hold is None) != (before.hold is None):
+        sides_differ = _sides(self.saturation) != _sides(before.saturation)
+        if sides_differ or (self.hold is None) != (before.hold is None):
             return True
         lost, known = self.lost, before.lost
         return lost is not None and bool(np.any(lost if known is None else lost & ~known))
@@ -179,10 +178,13 @@ def refine(
         whole[: problem.begins + min(memory, problem.y.size // 4)] = False
     arrivals = found.arrivals(problem.y.size, fs)
 
+    def assuming(mode: Intersample) -> Problem:
+        if mode == joint.best.intersample:
+            return problem
+        return replace(problem, source=prepared(u, mode, rest=problem.begins is None))
+
     def censored_fit(mode: Intersample, start: Fit, counts: Mask | None) -> CensoredFit:
-        read = replace(problem, valid=counts, nuisance=None, begins=None)
-        if mode != joint.best.intersample:
-            read = replace(read, source=prepared(u, mode, rest=problem.begins is None))
+        read = replace(assuming(mode), valid=counts, nuisance=None, begins=None)
         return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=disturbance)
 
     tried: list[tuple[Trial, CensoredFit]] = []
@@ -207,13 +209,11 @@ def refine(
     counted[censored.index] = True
     fit = replace(censored.fit, residual=censored.fit.residual * counted)
     best = replace(chosen, fit=fit)
-    if chosen.intersample != joint.best.intersample:
-        source = prepared(u, chosen.intersample, rest=problem.begins is None)
-        problem = replace(problem, source=source)
+    final = replace(assuming(chosen.intersample), valid=counted)
     refined = replace(
         joint,
-        problem=replace(problem, valid=counted),
-        weighed=replace(problem, valid=counted),
+        problem=final,
+        weighed=final,
         best=best,
         trials=_weighed_again(joint, tried, best),
         rivals=(),

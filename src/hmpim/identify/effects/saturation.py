@@ -167,10 +167,8 @@ def _scattered(y: Real, sigma: float) -> Side | None:
     level = top - DEVIATIONS * sigma
     for _ in range(50):  # moves to where the values are densest
         weight = held * np.exp(-0.5 * ((place - level) / sigma) ** 2)
-        moved = float(weight @ place / weight.sum())
-        done = abs(moved - level) < 1e-6 * sigma
-        level = moved
-        if done:
+        before, level = level, float(weight @ place / weight.sum())
+        if abs(level - before) < 1e-6 * sigma:
             break
     near = np.abs(y - level) < DEVIATIONS * sigma
     count = int(np.count_nonzero(near))
@@ -188,6 +186,7 @@ def _scattered(y: Real, sigma: float) -> Side | None:
 def _is_clipped(
     y: Real, side: Side, prediction: Real | None, step: float, span: float, scatter: float
 ) -> bool:
+    """Whether a level is one of clipping, by the values near it or by the prediction."""
     resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     if side.exact:
         resolution *= 2.0  # the level covers half a step on either side
@@ -199,9 +198,8 @@ def _is_clipped(
         return False
     if prediction is not None:
         return _is_confirmed(y, side, prediction, resolution, scatter)
-    if below.size < _FEWEST or not _is_even(below, resolution, reach):
-        return False
-    return _is_flat(y, side, resolution, reach)
+    even = below.size >= _FEWEST and _is_even(below, resolution, reach)
+    return even and _is_flat(y, side, resolution, reach)
 
 
 def _is_crowded(count: int, below: Real, resolution: float) -> bool:
@@ -322,5 +320,5 @@ def _is_confirmed(y: Real, side: Side, prediction: Real, resolution: float, scat
         return True
     # Values that scatter elsewhere are all alike here, while the prediction moves.
     noise = min(error, scatter)
-    moves = float(np.std(beyond))
-    return bool(noise > resolution and moves > max(MUCH * noise, MATERIAL * float(np.ptp(y))))
+    least = max(MUCH * noise, MATERIAL * float(np.ptp(y)))
+    return bool(noise > resolution and np.std(beyond) > least)

@@ -116,12 +116,10 @@ def _cost(y: Real, rows: Real) -> float:
 def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
     """Whether the output falls short of the prediction at its low and at its high end."""
     p = rows[1]
-    ends = np.quantile(p, [0.1, 0.9])
-    hinges = np.stack([np.minimum(p - ends[0], 0.0), np.maximum(p - ends[1], 0.0)])
+    low, high = np.quantile(p, [0.1, 0.9])
     found = []
-    for i in range(2):
-        full = np.vstack([rows, hinges[i]])
-        q, r = np.linalg.qr(full.T)
+    for hinge in (np.minimum(p - low, 0.0), np.maximum(p - high, 0.0)):
+        q, r = np.linalg.qr(np.vstack([rows, hinge]).T)
         if abs(r[-1, -1]) <= 1e-9 * float(np.linalg.norm(p)):
             found.append(False)
             continue

@@ -211,15 +211,14 @@ def identify_levels(
         heights = [float(np.ptp(r.channel(pair.input).values)) / 2 for r in given]
         heights = heights if amplitudes is None else list(amplitudes)
         first = results[int(np.argmin(heights))][key]
-        alike = [
-            found
-            if (found := result[key]).structure == first.structure
-            or found.verdict == "not_identifiable"
-            else identify(record, intersample=first.intersample, structures=_only(first.structure))[
-                key
-            ]
-            for record, result in zip(given, results, strict=True)
-        ]
+        alike = []
+        for record, result in zip(given, results, strict=True):
+            found = result[key]
+            if found.structure != first.structure and found.verdict != "not_identifiable":
+                only = _only(first.structure)
+                again = identify(record, intersample=first.intersample, structures=only)
+                found = again[key]
+            alike.append(found)
         unit = given[0].channel(pair.input).unit if amplitudes is None else ""
         comparisons.append(compare_levels(alike, heights, unit=unit))
     return Levels(results=tuple(results), comparisons=tuple(comparisons))
