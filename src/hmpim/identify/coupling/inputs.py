@@ -64,16 +64,8 @@ def input_set(
 ) -> InputSet:
     """Find which inputs one record distinguishes, and where.
 
-    Parameters
-    ----------
-    inputs : sequence of ndarray, shape (n,)
-        Sampled on one clock; none is constant.
-    names : sequence of str
-        One for each.
-    fs : float
-        Hz.
-    stated : tuple of float or None
-        Band stated for the record, Hz.
+    The inputs, (n,), are sampled on one clock at a rate in Hz, and none is constant; each has a
+    name. `stated` is the band stated for the record, in Hz.
 
     Examples
     --------

@@ -159,7 +159,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     return GainChange(
         joint=lead.joint,
         taken=taken,
-        trend=lead.trend,
+        trend=(lead.joint.best.fit.prediction - lead.level) * (lead.course - 1.0),
         course=lead.course,
         change=score.change,
         std=score.std,
@@ -191,11 +191,6 @@ class _Settled:
     gained: float
     course: Real
     level: float
-
-    @property
-    def trend(self) -> Real:
-        """What the change adds to the model's output."""
-        return np.asarray((self.joint.best.fit.prediction - self.level) * (self.course - 1.0))
 
     @property
     def white(self) -> bool:

@@ -20,7 +20,6 @@ from hmpim.identify.effects.lost import (
     find_repeated,
     find_spikes,
     find_stuck,
-    may_repeat,
     stands_out,
 )
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
@@ -133,6 +132,9 @@ def find_imperfections(
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
     repeated = find_repeated(y) if rounding is None and hold is None else None
+    unsure = None
+    if repeated is not None and valid is not None:  # a sample after a gap may be a copy
+        unsure = np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
     return Imperfections(
         saturation=clipping,
         hold=hold,
@@ -140,7 +142,7 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=repeated,
-        unsure=None if repeated is None or valid is None else may_repeat(valid),
+        unsure=unsure,
         levels=_few_levels(y, inputs),
     )
 

@@ -20,7 +20,6 @@ __all__ = [
     "find_repeated",
     "find_spikes",
     "find_stuck",
-    "may_repeat",
     "stand_out",
     "stands_out",
 ]
@@ -187,14 +186,3 @@ def find_repeated(y: Real) -> Mask | None:
         elif y[a] not in extreme:
             inside += b - a
     return copies if inside >= max(3, WORTH * y.size) else None
-
-
-def may_repeat(valid: Mask) -> Mask:
-    """Samples after an invalid one: where frames repeat, they may be its copies.
-
-    Examples
-    --------
-    >>> may_repeat(np.array([True, False, False, True, True])).tolist()
-    [False, False, False, True, False]
-    """
-    return np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
