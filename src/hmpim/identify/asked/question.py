@@ -26,7 +26,7 @@ __all__ = ["Question", "recognise_software"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Question:
-    """Which model leads from the inputs of a record to one of its outputs."""
+    """One output of a record, to be modelled from the inputs."""
 
     record: Record
     aligned: Aligned  # the record on one clock
@@ -41,7 +41,7 @@ class Question:
 
     @property
     def plain(self) -> tuple[StructureName, ...]:
-        """The plain structures among those to try; all of them where none is plain."""
+        """The plain structures among those to try; all of them if none is plain."""
         return tuple(name for name in self.structures if name in PLAIN) or self.structures
 
     @property
@@ -51,7 +51,7 @@ class Question:
 
     @property
     def measured(self) -> Mask | None:
-        """Samples at which every input is known, shape (n,); None when all are."""
+        """Samples at which every input is known, shape (n,); None if all are."""
         known = np.logical_and.reduce([_known(source) for source in self.aligned.inputs])
         return None if bool(known.all()) else np.asarray(known)
 

@@ -49,7 +49,7 @@ _NEGLIGIBLE = 1e-4
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Instrument:
-    """A reference, and the part of the input that it moves; all of shape (n,)."""
+    """A reference, and the part of the input that it moves; the arrays have shape (n,)."""
 
     name: str  # of the reference
     reference: Real

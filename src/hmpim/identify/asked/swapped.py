@@ -54,8 +54,9 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
 
     `u` and `y` are the samples of the so-called input and output, (n,), and `valid` marks those at
     which both were measured. True only if all of this holds: `y` is ahead at the peak of the
-    correlation; the past of `y` predicts `u`, compared with past and future, better than the past
-    of `u` predicts `y`, by a fifth; no other step contradicts; and `y` is no integral of `u`.
+    correlation; the past of `y` alone predicts `u` better than the past of `u` alone predicts `y`,
+    by a fifth, each relative to past and future; no other step contradicts; and `y` is no integral
+    of `u`.
 
     Examples
     --------

@@ -208,7 +208,7 @@ class Pairs:
         return bool(low)
 
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
-        """Move all couplings at once; drop the weakest if it adds nothing, and return whether."""
+        """Move all couplings at once; drop the weakest if it adds nothing; return if dropped."""
         dominant = self.dominant
         moved = [j for j in self.kept if j not in dominant]
         weak = [j for j in moved if j not in self.strong]

@@ -93,7 +93,7 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
 def _spread_by_speed(away: Real, motion: Real) -> Real:
     """Deviation at each sample that its motion explains, (n,), from samples that move as fast.
 
-    An error in time, or of the model, is a share of the motion; at an edge, only for few samples.
+    An error in time, or of the model, is a share of the motion, at an edge in one sample of three.
     """
     order = np.argsort(motion)
     largest = sliding_window_view(np.pad(away, 1, mode="edge"), 3).max(axis=1)

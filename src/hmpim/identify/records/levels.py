@@ -166,7 +166,6 @@ def identify_levels(
     amplitudes : sequence of float, optional
         One per record, in any measure that is the same for all; if None, half the range of each
         pair's own input.
-        each pair's own input covers.
     intersample, structures
         As in `identify`. Each pair takes the structure found at the smallest amplitude at all
         levels, so that they can be compared.
