@@ -180,9 +180,8 @@ def _refined(
     for part, model, cut in zip(parts, models, [0, *cuts], strict=True):
         scale[cut] = max(abs(model.delay), 1.0 / waveforms[0].fs)
         scale[cut + part.size - len(_moved_coefficients(model)) : cut + part.size] = 1.0
-    small = np.full(begun.size, _APART)
     done = scipy.optimize.least_squares(
-        error, begun, x_scale=scale, diff_step=small, max_nfev=_STEPS
+        error, begun, x_scale=scale, diff_step=np.full(begun.size, _APART), max_nfev=_STEPS
     )
     return made(np.asarray(done.x))
 

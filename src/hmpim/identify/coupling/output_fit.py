@@ -276,8 +276,8 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
     """Amplitude (r.m.s.) that each input, or its sum, explains, if it is much of the residual.
 
-    The second value are the inputs of which only the sum does. Friction correlates with an input that does not
-    cause it; a response to an input follows it over all its band.
+    The second value is the inputs of which only the sum does. Friction correlates with an input
+    that does not cause it; a response to an input follows it over all its band.
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)

@@ -212,17 +212,14 @@ def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
             shift = -slope / gain
             variance = float(np.linalg.inv(gram)[1, 1]) / gain**2
             found.append((float(lag), delay + shift, variance, float(residual @ residual)))
-        likely = [p for p in found if p[1] >= _EARLIEST]
+        likely = [point for point in found if point[1] >= _EARLIEST]
         if not likely:
             return None
-        costs = np.array([p[3] for p in likely])
+        lags, delays, variances, costs = np.array(likely).T.copy()
         sigma2 = float(costs.min()) / max(problem.counted - others.shape[0] - 3, 1)
         weight = np.exp(-0.5 * (costs - costs.min()) / sigma2)
-        reached = max(p[0] for p, w in zip(likely, weight, strict=True) if w > FALSE_ALARM)
-        top = min(1.3 * reached + FEW, top)
-    lags = np.array([p[0] for p in likely])
-    delays = np.array([p[1] for p in likely])
-    variances = sigma2 * np.array([p[2] for p in likely])
+        top = min(1.3 * float(lags[weight > FALSE_ALARM].max()) + FEW, top)
+    variances *= sigma2
     weight /= weight.sum()
     delay, lag = float(weight @ delays), float(weight @ lags)
     step = lags[1] - lags[0] if lags.size > 1 else 0.0

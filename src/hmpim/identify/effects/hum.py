@@ -1,8 +1,8 @@
 """Mains hum on the output: sinusoids, fitted together with the model.
 
-They are looked for if the residual has a spectral line that the input lacks. Each line is three rows of the
-same fit: cosine, sine, and the change with a small error in frequency, so that the error bars
-include that error.
+They are looked for if the residual has a spectral line that the input lacks. Each line is three
+rows of the same fit: cosine, sine, and the change with a small error in frequency, so that the
+error bars include that error.
 """
 
 from collections.abc import Callable

@@ -154,10 +154,9 @@ def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
             low = float(np.mean(y[below]))
         if above.any():
             high = float(np.mean(y[above]))
-        moved = (q < low) & np.isfinite(low), (q > high) & np.isfinite(high)
-        done = np.array_equal(moved[0], below) and np.array_equal(moved[1], above)
-        below, above = moved
-        if done:
+        before = below, above
+        below, above = (q < low) & np.isfinite(low), (q > high) & np.isfinite(high)
+        if np.array_equal(before, (below, above)):
             break
     cost = float(np.sum((y - np.clip(q, low, high)) ** 2))
     return _Split(

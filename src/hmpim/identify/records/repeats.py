@@ -240,16 +240,14 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
     frequency = found[0].frequency_response.frequency
     delay = found[0].parameters.delay
     late = 0.0 if delay is None else delay.value
-    responses, stds = [], []
     known = [one for pair in found if (one := pair.frequency_response).frequency.size]
     if not known or not frequency.size:
         return found[0].frequency_response, float("nan")
-    for own in known:
-        straight = own.response * np.exp(2j * np.pi * own.frequency * late)
-        responses.append(np.interp(frequency, own.frequency, straight))
-        stds.append(np.interp(frequency, own.frequency, own.std))
-    values = np.stack(responses)
-    weights = 1.0 / np.maximum(np.stack(stds), np.finfo(float).tiny ** 0.25) ** 2
+    straight = [own.response * np.exp(2j * np.pi * own.frequency * late) for own in known]
+    pairs = zip(known, straight, strict=True)
+    values = np.stack([np.interp(frequency, own.frequency, y) for own, y in pairs])
+    stds = np.stack([np.interp(frequency, own.frequency, own.std) for own in known])
+    weights = 1.0 / np.maximum(stds, np.finfo(float).tiny ** 0.25) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     scatter = np.sum(weights * np.abs(values - mean) ** 2, axis=0) / max(len(known) - 1, 1)
     finite = scatter[np.isfinite(scatter)]
