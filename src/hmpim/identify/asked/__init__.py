@@ -1,8 +1,8 @@
-"""What is asked of a record, before anything is fitted.
+"""Checks and preparation before anything is fitted.
 
-refusals   arguments and records that cannot be answered
-question   one output, and all that is known of it beforehand; whether it is software's
-reference  a plant in a loop: what the loop's reference moves of the input
+refusals   arguments and records that are refused
+question   one output, and what is known of it beforehand; whether the record is software's
+reference  a plant in a loop, identified through the loop's reference
 clocks     inputs that change between the samples of the outputs
-swapped    whether the columns were taken the wrong way round
+swapped    whether input and output were swapped
 """

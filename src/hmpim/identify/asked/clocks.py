@@ -1,16 +1,16 @@
-"""Inputs with corners between the samples: what folds in the output, put right by the model.
+"""Inputs with corners between the samples: aliasing in the output, corrected by the model.
 
-A held input has images of what it holds above half its rate. Sampled by another clock, the answer
-to them folds back, and by that alone a delay may be off by a tenth of a sample. No filter takes it
-out, as it lies among the rest. But with a model the whole answer to the true waveform is known at
-the output's own stamps, and so is the answer to what of the input lies on the common clock::
+A held input has images above half its rate. Sampled by another clock, the response to them folds
+back, and by that alone a delay may be off by a tenth of a sample. No filter removes it, as it
+overlaps the rest. But with a model, the response to the true waveform is known at the output's own
+stamps, and so is the response to the part of the input that the common clock represents::
 
-    y on the grid  =  (y - answer to the waveform, at its own stamps) + answer to the grid's input
+    y on the grid  =  (y - response to waveform, at its own stamps) + response to the grid's input
 
-What is in the brackets is noise and what the model lacks. The model is first moved to where the
-brackets are least (Gauss and Newton's steps, with the true waveform), so that a delay and a fast
-pole, which the grid's input hardly tells apart, are told by the corners themselves. Then all is
-identified again, and once more if the correction still moves.
+The difference in brackets is noise and model error. The model is first refined to minimise it
+(Gauss-Newton steps, with the true waveform), so that the corners distinguish a delay from a fast
+pole, which the grid's input hardly does. Then all is identified again, and once more if the
+correction still moves.
 """
 
 from collections.abc import Callable
@@ -29,53 +29,61 @@ __all__ = ["settled_between"]
 
 
 _STEPS = 15
-"""Evaluations of all derivatives in which the models are moved."""
+"""Most evaluations of all derivatives while the models are refined."""
 
 _APART = 1e-5
-"""Relative step of the derivatives: of a delay of a sample a thousandth of what matters."""
+"""Relative step of the derivatives: of a delay of a sample, a thousandth of what matters."""
 
 _HOPELESS = 1e3
-"""Times the output's range that stands for a model that cannot be simulated."""
-
+"""Error, over the output's range, of a model that cannot be simulated."""
 
 _ROUNDS = 3
-"""Times that what folds between two clocks is taken out and all is identified again, at most."""
+"""Most times that the correction is made and all is identified again."""
 
 _STILL = 0.003
-"""Samples by which the delay may still move with it: less than a third of one hundredth."""
+"""Samples by which the delay may still move: less than a third of one hundredth."""
 
 
 def settled_between(
     record: Record, aligned: Aligned, identified: Callable[[Aligned, bool], Identification]
 ) -> Identification:
-    """Identify, what folds between the clocks taken out by the models found, until it stays.
+    """Identify with the aliasing between the clocks corrected by the models, until it converges.
 
-    The record has the outputs at their own stamps; `identified` identifies an aligned record, by
+    The record has the outputs at their own stamps; `identified` identifies an aligned record, with
     plain structures only if its second argument is true.
     """
     names = ", ".join(repr(signal.name) for signal in aligned.inputs)
-    said = _settled_finding(names, _STILL / aligned.fs)
-    told = tuple(f for f in aligned.findings if f.code != said.code)
-    taken = _unfolded(record, aligned, identified(aligned, True))
+    finding = Finding(
+        code="held_between",
+        message=(
+            f"Values of {names} change between samples of the outputs. The model "
+            f"predicts what this folds into them; it was removed repeatedly, until the delay "
+            f"changed by less than {1e6 * (_STILL / aligned.fs):.2g} µs."
+        ),
+        severity="info",
+        parameters=(),
+    )
+    others = tuple(f for f in aligned.findings if f.code != finding.code)
+    corrected = _unfolded(record, aligned, identified(aligned, True))
     for _ in range(_ROUNDS):
-        found = identified(replace(taken, findings=(*told, said)), False)
-        before, taken = taken, _unfolded(record, aligned, found)
-        if _moved_by(before, taken) < _STILL:
+        found = identified(replace(corrected, findings=(*others, finding)), False)
+        before, corrected = corrected, _unfolded(record, aligned, found)
+        if _moved_by(before, corrected) < _STILL:
             return found
     return identified(before, False)  # with the doubt
 
 
 def _unfolded(record: Record, aligned: Aligned, found: Identification) -> Aligned:
-    """The record as if its inputs had nothing above half the rate, by the models found so far."""
+    """The record as if its inputs had no power above half the rate, by the models found so far."""
     outputs = tuple(
-        _one(channel, signal, record, aligned, found)
+        _corrected(channel, signal, record, aligned, found)
         for channel, signal in zip(record.outputs, aligned.outputs, strict=True)
     )
     return replace(aligned, outputs=outputs)
 
 
 def _moved_by(before: Aligned, after: Aligned) -> float:
-    """Return the delay, in samples, by which two corrections differ, the most of all outputs."""
+    """Largest delay over all outputs, in samples, by which two corrections differ."""
     most = 0.0
     for first, second in zip(before.outputs, after.outputs, strict=True):
         slope = np.gradient(second.values)
@@ -85,24 +93,10 @@ def _moved_by(before: Aligned, after: Aligned) -> float:
     return most
 
 
-def _settled_finding(names: str, seconds: float) -> Finding:
-    """Say that it was done."""
-    return Finding(
-        code="held_between",
-        message=(
-            f"Values of {names} change between samples of the outputs. The model "
-            f"predicts what this folds into them; it was removed repeatedly, until the delay "
-            f"changed by less than {1e6 * seconds:.2g} µs."
-        ),
-        severity="info",
-        parameters=(),
-    )
-
-
-def _one(
+def _corrected(
     channel: Channel, signal: Signal, record: Record, aligned: Aligned, found: Identification
 ) -> Signal:
-    """One output without what folds in it."""
+    """One output without aliasing from its inputs."""
     driven = [
         (model, waveform, source.values)
         for waveform, source in zip(aligned.waveforms, aligned.inputs, strict=True)
@@ -113,16 +107,16 @@ def _one(
     models, waveforms, smooth = (list(part) for part in zip(*driven, strict=True))
     counted = _counted(channel, aligned)
     models = _refined(models, waveforms, channel, counted)
-    rest = channel.values - _answers(models, waveforms, channel.time)
+    rest = channel.values - _responses(models, waveforms, channel.time)
     own = fit_clock(channel.time, nominal=record.fs)
-    left, _ = on_grid(
+    on_clock, _ = on_grid(
         Channel(name=channel.name, time=channel.time, values=rest),
         own,
         aligned.time,
         fs=aligned.fs,
         intersample=None,
     )
-    values = left + sum(
+    values = on_clock + sum(
         simulate(model, u, fs=aligned.fs, intersample="bandlimited")
         for model, u in zip(models, smooth, strict=True)
     )
@@ -131,7 +125,7 @@ def _one(
 
 
 def _linear(pair: PairIdentification) -> Model | None:
-    """Model of what a pair does but for bias and effects; None where there is none."""
+    """Linear model of a pair, without bias and effects; None without delay or scale factor."""
     delay, scale = pair.parameters.delay, pair.parameters.scale_factor
     if delay is None or scale is None:
         return None
@@ -151,8 +145,8 @@ def _counted(channel: Channel, aligned: Aligned) -> Mask:
     return np.asarray(inside & known[np.clip(nearest, 0, aligned.samples - 1)])
 
 
-def _answers(models: list[Model], waveforms: list[Waveform], at: Real) -> Real:
-    """What models answer to what the inputs truly were, at any instants (s)."""
+def _responses(models: list[Model], waveforms: list[Waveform], at: Real) -> Real:
+    """Sum of the models' responses to the true waveforms, at any instants (s)."""
     total = np.zeros(at.size)
     for model, waveform in zip(models, waveforms, strict=True):
         y = simulate(model, waveform.values, fs=waveform.fs, intersample=waveform.intersample)
@@ -163,9 +157,9 @@ def _answers(models: list[Model], waveforms: list[Waveform], at: Real) -> Real:
 def _refined(
     models: list[Model], waveforms: list[Waveform], channel: Channel, counted: Mask
 ) -> list[Model]:
-    """The models moved to where they explain an output best, by the true waveforms."""
+    """Refine the models to explain an output best, with the true waveforms."""
     if not np.all([c > 0.0 for model in models for c in _moved_coefficients(model)]):
-        return models  # no logarithm
+        return models  # no logarithm exists
     parts = [_vector(model) for model in models]
     cuts = np.cumsum([part.size for part in parts])[:-1]
     begun = np.concatenate(parts)
@@ -174,37 +168,37 @@ def _refined(
     def made(x: Real) -> list[Model]:
         return [_made(model, part) for model, part in zip(models, np.split(x, cuts), strict=True)]
 
-    def left(x: Real) -> Real:
+    def error(x: Real) -> Real:
         try:
-            answers = _answers(made(x), waveforms, channel.time)
+            predicted = _responses(made(x), waveforms, channel.time)
         except ArgumentError:  # not stable
             return hopeless
-        rest = (channel.values - answers)[counted]
+        rest = (channel.values - predicted)[counted]
         return np.asarray(rest - rest.mean())
 
     scale = np.where(np.abs(begun) > 0.0, np.abs(begun), 1.0)
     for part, model, cut in zip(parts, models, [0, *cuts], strict=True):
         scale[cut] = max(abs(model.delay), 1.0 / waveforms[0].fs)
         scale[cut + part.size - len(_moved_coefficients(model)) : cut + part.size] = 1.0
-    small = np.full(begun.size, _APART)
     done = scipy.optimize.least_squares(
-        left, begun, x_scale=scale, diff_step=small, max_nfev=_STEPS
+        error, begun, x_scale=scale, diff_step=np.full(begun.size, _APART), max_nfev=_STEPS
     )
     return made(np.asarray(done.x))
 
 
 def _moved_coefficients(model: Model) -> tuple[float, ...]:
-    """Coefficients of the denominator but the last, which is 1, or 0 of an integrator."""
+    """Coefficients of the denominator but the last: it is 1, or 0 with an integrator."""
     return model.denominator[: -1 if model.denominator[-1] else -2]
 
 
 def _vector(model: Model) -> Real:
-    """Delay, numerator with the scale factor, logarithms of what moves in the denominator."""
+    """Delay, numerator with scale factor, and logarithms of the free denominator coefficients."""
     numerator = model.scale_factor * np.asarray(model.numerator)
     return np.concatenate([[model.delay], numerator, np.log(_moved_coefficients(model))])
 
 
 def _made(model: Model, vector: Real) -> Model:
+    """Model with the parameters of such a vector."""
     zeros = len(model.numerator)
     moved = np.exp(vector[1 + zeros :])
     fixed = model.denominator[moved.size :]

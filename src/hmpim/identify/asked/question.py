@@ -1,6 +1,6 @@
 """One output of a record, and all that is known of it before anything is fitted.
 
-Also whether the record is that of software, which sees samples and nothing between them.
+Also whether the record is that of software, which processes samples and nothing between them.
 """
 
 from dataclasses import dataclass, replace
@@ -26,27 +26,23 @@ __all__ = ["Question", "recognise_software"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Question:
-    """Which model leads from the inputs of a record to one of its outputs."""
+    """One output of a record, to be modelled from the inputs."""
 
-    # as recorded, and on one clock
     record: Record
-    aligned: Aligned
-    output: Signal  # the output that is asked for
-    # what the inputs do between their samples; None where the data are to choose
-    intersample: Intersample | None
+    aligned: Aligned  # the record on one clock
+    output: Signal  # the output to identify
+    intersample: Intersample | None  # what the inputs do between samples; None if unknown
     structures: tuple[StructureName, ...]  # dynamics to try
-    inputs: InputSet | None  # how well several inputs are told apart; None of one
-    instrument: Instrument | None  # what a loop's reference moves of the input
-    # said where the input follows the output: then only plain structures are tried
-    swapped: Finding | None = None
+    inputs: InputSet | None  # how well several inputs are distinguished; None with one
+    instrument: Instrument | None  # the part of the input that a loop's reference moves
+    swapped: Finding | None = None  # if the input follows the output; only plain structures then
     exact: bool = False  # whether a filter between samples explains all but rounding
-    # of a unit that follows its command up to some speed: then the input is what it follows
-    limited: LimitedCommand | None = None
-    linear: bool = False  # whether a nonlinearity is reported only, and not modelled
+    limited: LimitedCommand | None = None  # a speed limit; the input is then the limited command
+    linear: bool = False  # whether a nonlinearity is only reported, not modelled
 
     @property
     def plain(self) -> tuple[StructureName, ...]:
-        """The plain structures among those to try; all of them where none is plain."""
+        """The plain structures among those to try; all of them if none is plain."""
         return tuple(name for name in self.structures if name in PLAIN) or self.structures
 
     @property
@@ -56,9 +52,9 @@ class Question:
 
     @property
     def measured(self) -> Mask | None:
-        """Samples at which every input is known, shape (n,); None when all are."""
-        told = np.logical_and.reduce([_known(source) for source in self.aligned.inputs])
-        return None if bool(told.all()) else np.asarray(told)
+        """Samples at which every input is known, shape (n,); None if all are."""
+        known = np.logical_and.reduce([_known(source) for source in self.aligned.inputs])
+        return None if bool(known.all()) else np.asarray(known)
 
     def band(self, i: int) -> tuple[float, float]:
         """Band in Hz that an input excites."""
@@ -69,7 +65,7 @@ class Question:
 
 
 def _known(source: Signal) -> Mask:
-    """Samples that were measured, and those lost that the others tell of an input that holds."""
+    """Samples that were measured, and lost ones that are known as the input holds its value."""
     if source.valid.all():
         return source.valid
     place = np.arange(source.valid.size)
@@ -81,25 +77,25 @@ def _known(source: Signal) -> Mask:
 
 
 def _shortest_stay(u: Real, valid: Mask) -> float:
-    """Shortest complete stay at a level, in samples; infinite where levels hardly recur.
+    """Shortest complete stay at a level, in samples; infinite if levels hardly recur.
 
     A shorter gap between two equal values hides no motion.
     """
-    told = u[valid]
-    stays = 1 + np.count_nonzero(np.diff(told))
-    if stays <= TWICE * np.unique(told).size:
+    measured = u[valid]
+    stays = 1 + np.count_nonzero(np.diff(measured))
+    if stays <= TWICE * np.unique(measured).size:
         return np.inf
     edges = np.flatnonzero(np.diff(u) != 0.0) + 1
     lost = np.concatenate([[0], np.cumsum(~valid)])
-    whole = lost[edges[1:] + 1] == lost[edges[:-1] - 1]  # from the sample before to that after
+    whole = lost[edges[1:] + 1] == lost[edges[:-1] - 1]  # measured from one sample before to after
     lengths = np.diff(edges)[whole]
     return float(lengths.min()) if lengths.size else 1.0
 
 
 def recognise_software(question: Question) -> Question:
-    """Ask for filters where rounding is all the noise, and no plainer system explains the record.
+    """Try filters if rounding is the only noise, and no simpler system explains the record.
 
-    Of one input whose samples are all there, and of which nothing is stated.
+    Only for one input, with all samples valid and no assumption stated.
     """
     source, output = question.aligned.inputs[0], question.output
     if question.intersample is not None or question.swapped or question.instrument:

@@ -1,12 +1,12 @@
 """A plant in a loop, identified through the loop's reference.
 
-What the loop feeds back makes the input follow the noise, so that a fit of output to input takes
-noise for answer. The reference does not know the noise. So the output is fitted first to the part
-of the input that the reference moves (two stages: P. Van den Hof and R. Schrama, Automatica 29,
+Feedback makes the input follow the noise, so a fit of output to input would take noise for a
+response. The reference is independent of the noise. So the output is first fitted to the part of
+the input that the reference moves (two stages: P. Van den Hof and R. Schrama, Automatica 29,
 1993). That part then is an instrument: the parameters are moved to where the residual of output and
-*input* is orthogonal to their derivatives made from the *instrument* (refined instrumental
-variables: T. Söderström and P. Stoica, System Identification, 1989, ch. 8; M. Gilson and P. Van den
-Hof, Automatica 41, 2005). An instrument that is not exact widens the error bars and moves nothing.
+*input* is orthogonal to their derivatives for the *instrument* (refined instrumental variables:
+T. Söderström and P. Stoica, System Identification, 1989, ch. 8; M. Gilson and P. Van den Hof,
+Automatica 41, 2005). An inexact instrument widens the error bars and causes no bias.
 """
 
 from dataclasses import dataclass, replace
@@ -37,28 +37,27 @@ __all__ = [
 ]
 
 _LONGEST = 256
-"""Samples over which the input is taken to answer the reference, at most."""
+"""Most samples over which the input responds to the reference."""
 
 _SHARE = 8
-"""Samples for each of its weights, at least."""
+"""Fewest samples for each weight of that response."""
 
 _STEPS = 40
 _NEGLIGIBLE = 1e-4
-"""Standard deviations by which the last step moves any parameter."""
+"""Standard deviations below which every step must be at the end."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Instrument:
-    """A reference, and what it moves."""
+    """A reference, and the part of the input that it moves; the arrays have shape (n,)."""
 
     name: str  # of the reference
-    # (n,): its samples, and the input's
     reference: Real
-    u: Real
-    moved: Real  # (n,): the part of the input that it moves
+    u: Real  # the input
+    moved: Real  # the part of it that the reference moves
 
     def finding(self) -> Finding:
-        """Say how the pair was identified."""
+        """Report how the pair was identified."""
         return Finding(
             code="through_reference",
             message=f"The plant is identified through reference {self.name!r}, so noise "
@@ -69,7 +68,7 @@ class Instrument:
 
 
 def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Instrument]:
-    """All channels on one clock, and in place of the input what the reference moves of it.
+    """Put all channels on one clock, and replace the input by the part that the reference moves.
 
     Raises
     ------
@@ -100,7 +99,7 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
 
 
 def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
-    """Take the part of an input that a reference moves, (n,): weights over its past, by Akaike.
+    """Fit the part of an input that a reference moves, (n,): weights over its past, by Akaike.
 
     Raises
     ------
@@ -118,8 +117,8 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
     while lags <= min(_LONGEST, max(8, u.size // _SHARE)):
         rows = np.column_stack([scipy.linalg.toeplitz(since, np.zeros(lags)), np.ones(u.size)])
         found = rows @ np.linalg.lstsq(rows, level, rcond=None)[0]
-        left = float(np.sum((level - found) ** 2))
-        criterion = u.size * np.log(max(left, np.finfo(float).tiny)) + 2 * lags
+        cost = float(np.sum((level - found) ** 2))
+        criterion = u.size * np.log(max(cost, np.finfo(float).tiny)) + 2 * lags
         if criterion < least:
             best, least = found, criterion
         lags *= 2
@@ -133,41 +132,39 @@ def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
 def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real]:
     """Move a fit to the instrument to where the input's own residual is orthogonal to it.
 
-    The fit is of the output to the part of the input that the reference moves; its structure and
-    its noise model are kept. With it comes the covariance of its parameters, (p, p).
+    The fit is of the output to the part of the input that the reference moves. Its structure and
+    noise model are kept. The second value is the covariance of its parameters, (p, p).
     """
-    asked = joint.weighed
-    problem = replace(asked, source=prepare_input(instrument.u, joint.best.intersample))
-    fit = _moved(
-        problem, joint.best.fit, np.zeros(joint.best.fit.theta.size + joint.best.fit.linear.size)
-    )
+    indirect, begun = joint.weighed, joint.best.fit
+    problem = replace(indirect, source=prepare_input(instrument.u, joint.best.intersample))
+    fit = _moved(problem, begun, np.zeros(begun.theta.size + begun.linear.size))
     for _ in range(_STEPS):
-        rows, told = jacobian(problem, fit), jacobian(asked, fit)
-        left = problem.innovations(fit.prediction, fit.residual)
-        # Scaled to unit size, as the parameters' own differ by many decades.
-        size = np.sqrt(np.maximum(np.sum(told**2, axis=1), np.finfo(float).tiny))
-        mixed = (told / size[:, None]) @ (rows / size[:, None]).T
-        step = np.linalg.lstsq(mixed, (told @ left) / size, rcond=1e-12)[0] / size
+        rows, tools = jacobian(problem, fit), jacobian(indirect, fit)
+        residual = problem.innovations(fit.prediction, fit.residual)
+        # Scaled to unit size, as the parameters differ by many decades.
+        size = np.sqrt(np.maximum(np.sum(tools**2, axis=1), np.finfo(float).tiny))
+        mixed = (tools / size[:, None]) @ (rows / size[:, None]).T
+        step = np.linalg.lstsq(mixed, (tools @ residual) / size, rcond=1e-12)[0] / size
         fit = _moved(problem, fit, step)
-        spread = np.sqrt(float(left @ left) / max(problem.counted, 1)) / size
+        spread = np.sqrt(float(residual @ residual) / max(problem.counted, 1)) / size
         if np.all(np.abs(step) < _NEGLIGIBLE * spread):
             break
     else:
         fit = replace(fit, converged=False)
-    rows, told = jacobian(problem, fit), jacobian(asked, fit)
-    left = problem.innovations(fit.prediction, fit.residual)
+    rows, tools = jacobian(problem, fit), jacobian(indirect, fit)
+    residual = problem.innovations(fit.prediction, fit.residual)
     freedom = max(problem.counted - rows.shape[0], 1)
-    white = is_white(problem.counting(left))
-    # (told rowsᵀ)⁻¹ told R toldᵀ (…)⁻ᵀ: the bound for the instrument, turned to the input.
-    turn = np.linalg.lstsq(told @ rows.T, told @ told.T, rcond=1e-14)[0]
-    cov = turn @ covariance(told, left, freedom=freedom, white=white) @ turn.T
+    white = is_white(problem.counting(residual))
+    # (tools rowsᵀ)⁻¹ tools R toolsᵀ (…)⁻ᵀ: the bound for the instrument, turned to the input.
+    turn = np.linalg.lstsq(tools @ rows.T, tools @ tools.T, rcond=1e-14)[0]
+    cov = turn @ covariance(tools, residual, freedom=freedom, white=white) @ turn.T
     best = replace(joint.best, fit=fit)
     trials = tuple(best if trial is joint.best else trial for trial in joint.trials)
     return replace(joint, best=best, trials=trials), np.asarray(cov)
 
 
 def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:
-    """The fit at other parameters; what is linear beside them is solved."""
+    """The fit at other parameters; all other linear ones are solved for."""
     unknown = fit.theta.size
     theta = within_reach(
         fit.structure,
@@ -182,10 +179,9 @@ def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:
     if others.shape[0]:
         counted, target = problem.masked(others), problem.masked(problem.y - own)
         own = own + np.linalg.lstsq(counted.T, target, rcond=None)[0] @ others
-    residual = problem.y - own
-    if problem.valid is not None:
-        residual = residual * problem.valid
-    innovations = problem.masked(problem.y - own)
+    error = problem.y - own
+    residual = error if problem.valid is None else error * problem.valid
+    innovations = problem.masked(error)
     return replace(
         fit,
         theta=theta,
@@ -203,8 +199,7 @@ def response_through(
 ) -> FrequencyResponse:
     """Return the plant's measured response: that from reference to output, over that to input.
 
-    Its error is at most the two errors together. The output has shape (n,); rate and band are in
-    Hz.
+    The error is at most the two errors together. `y` has shape (n,); rate and band are in Hz.
     """
     into, out = (local_response(instrument.reference, x, fs, band=band) for x in (instrument.u, y))
     ratio = out.response / into.response

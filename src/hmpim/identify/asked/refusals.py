@@ -1,4 +1,4 @@
-"""Arguments and records that cannot be answered, each refused in one sentence."""
+"""Arguments and records that are refused, each in one sentence."""
 
 from collections.abc import Sequence
 from typing import cast, get_args
@@ -20,11 +20,11 @@ __all__ = [
 _FEWEST_SAMPLES = 50
 
 _LARGEST = 1e75
-"""Size of a sample, and one over the least: fourth powers stay in the range of doubles."""
+"""Largest sample, and one over the smallest range: fourth powers must be representable."""
 
 
 def checked_intersample(intersample: str, stated: Intersample | None) -> Intersample | None:
-    """Return what the input does between its samples; None where it is to be found."""
+    """Return what the input does between its samples; None if that is to be found."""
     if intersample == "auto":
         return stated
     for known in get_args(Intersample):
@@ -39,19 +39,19 @@ def checked_intersample(intersample: str, stated: Intersample | None) -> Intersa
 def checked_structures(
     structures: Sequence[str] | None, intersample: Intersample | None
 ) -> tuple[StructureName, ...]:
-    """Return the structures that are to be tried: of software, filters."""
+    """Return the structures to try; for software, filters."""
     known = list(FILTERS) if intersample == "sampled" else list(STRUCTURES)
-    asked = tuple(structures) if structures is not None else tuple(known)
-    for name in asked:
+    wanted = tuple(structures) if structures is not None else tuple(known)
+    for name in wanted:
         if name not in known:
             raise ArgumentError(
                 f"structure {str(name)!r} is not known; choose one of {', '.join(known)}"
             )
-    return cast(tuple[StructureName, ...], asked)
+    return cast(tuple[StructureName, ...], wanted)
 
 
 def check_statistics(intersample: Intersample | None, reference: str | None) -> None:
-    """Refuse what statistics cannot tell."""
+    """Refuse what the statistics do not keep."""
     if intersample == "sampled":
         raise ArgumentError(
             "statistics do not know software (intersample='sampled'); identify the record"
@@ -64,7 +64,7 @@ def check_statistics(intersample: Intersample | None, reference: str | None) -> 
 
 
 def check_samples(record: Record) -> None:
-    """Refuse too few samples, and numbers whose products would leave the range of doubles."""
+    """Refuse too few samples, and numbers whose products would overflow or underflow."""
     channels = (*record.inputs, *record.outputs)
     for channel in channels:
         if channel.values.size < _FEWEST_SAMPLES:
@@ -88,7 +88,7 @@ def check_samples(record: Record) -> None:
 
 
 def check_moves(aligned: Aligned) -> None:
-    """Refuse an input that is constant, and outputs of which none moves."""
+    """Refuse an input that is constant, and a record in which no output moves."""
     for signal in aligned.inputs:
         if np.ptp(signal.values) == 0:
             raise RecordError(

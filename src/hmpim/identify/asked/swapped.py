@@ -1,13 +1,13 @@
-"""Whether an input follows its output: columns that were swapped, seen before anything is fitted.
+"""Whether an input follows its output: swapped columns, detected before anything is fitted.
 
-A unit answers after it was asked: its output is a weighted sum of the input's past. Where the
-columns are swapped, what is called output leads, and what is called input answers it: the pair
-then shows the inverse of a unit, which needs the future of what it is given.
+A unit responds after its input: its output is a weighted sum of the input's past. If the columns
+are swapped, the so-called output leads, and the pair shows the inverse of a unit, which needs the
+future of its input.
 
-So each of the two is told twice from the other, by least squares with equally many weights: from
-its past alone, and from past and future in equal parts. Where the order is right, the past alone
-serves the output at least as well, and the input worse. The difference of the two, in logarithms,
-changes its sign when the columns are swapped; nothing else about the record needs to be known.
+So each of the two is predicted from the other by least squares, with equally many weights: from its
+past alone, and from past and future in equal parts. If the order is right, the past alone is enough
+for the output, but not for the input. The difference of the two, in logarithms, changes its sign if
+the columns are swapped; nothing else about the record needs to be known.
 """
 
 import numpy as np
@@ -31,50 +31,42 @@ _WEIGHTS = 20
 """Weights on each side; twice as many for the past alone."""
 
 _LEAD = 1
-"""Samples of the future that the change of `y` may need: a central difference does."""
+"""Samples of the future that the change of `y` may need: one for a central difference."""
 
 _STEPS = (1, 2, 4)
-"""Samples from weight to weight: what is near is seen finely, what is far coarsely."""
+"""Samples from weight to weight: short steps resolve fast responses, long ones reach further."""
 
 _BAND = 0.1
-"""Cycles a sample below which nearly all of what the two share lies, after thinning."""
+"""Cycles per sample below which nearly all common power lies, after averaging over blocks."""
 
 _ROWS = 20_000
-"""Samples that are looked at, at most."""
+"""Most samples used."""
 
 _FEWEST = 200
-"""Samples that are looked at, at least."""
+"""Fewest samples used."""
 
 _UNSEEN = 1e-11
-"""Share of the greatest eigenvalue below which the source does not have a direction."""
+"""Share of the greatest eigenvalue below which the source has no power in a direction."""
 
 
 def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     """Whether `u` follows `y` rather than `y` follows `u`.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Samples of what is called input, and of what is called output.
-    valid : ndarray of bool, shape (n,)
-        Samples at which both were measured.
-
-    Returns
-    -------
-    bool
-        True only if all of this holds: `y` is ahead at the peak of the correlation; the past of
-        `y` serves `u`, beside past and future, better than the past of `u` serves `y`, by a fifth;
-        no other reach of the weights says the contrary; and `y` is no integral of `u`.
+    `u` and `y` are the samples of the so-called input and output, (n,), and `valid` marks those at
+    which both were measured. True only if all of this holds: `y` is ahead at the peak of the
+    correlation; the past of `y` alone predicts `u` better than the past of `u` alone predicts `y`,
+    by a fifth, each relative to past and future; no other step contradicts; and `y` is no integral
+    of `u`.
 
     Examples
     --------
     >>> rng = np.random.default_rng(1)
     >>> t = np.arange(1000) / 100
-    >>> asked = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
-    >>> lagging = np.convolve(asked, 0.2 * 0.8 ** np.arange(60))[:1000]
-    >>> answered = np.roll(lagging, 5) + 0.02 * rng.standard_normal(1000)
-    >>> told = np.ones(1000, dtype=bool)
-    >>> is_swapped(asked, answered, told), is_swapped(answered, asked, told)
+    >>> sweep = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
+    >>> lagging = np.convolve(sweep, 0.2 * 0.8 ** np.arange(60))[:1000]
+    >>> response = np.roll(lagging, 5) + 0.02 * rng.standard_normal(1000)
+    >>> valid = np.ones(1000, dtype=bool)
+    >>> is_swapped(sweep, response, valid), is_swapped(response, sweep, valid)
     (False, True)
     """
     if np.count_nonzero(valid) < _FEWEST:
@@ -93,7 +85,7 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
 
 
 def swapped_finding(source: str, output: str) -> Finding:
-    """Sentence on columns that were swapped.
+    """Report that input and output are swapped.
 
     Examples
     --------
@@ -111,10 +103,10 @@ def swapped_finding(source: str, output: str) -> Finding:
 
 
 def lags_behind(joint: JointFit) -> bool:
-    """Whether an output that is ahead lags all the same, as the inverse of a unit cannot.
+    """Whether an output that is ahead still lags, which the inverse of a unit cannot.
 
-    Its clock then is late, and the columns are right: behind a negative delay there are poles that
-    the record tells, and they leave white noise.
+    Its clock is then late, and the columns are right: a negative delay is followed by poles that
+    the record determines, and the residual is white.
     """
     fit = joint.best.fit
     if not fit.structure.order or not is_white(joint.problem.counting(fit.residual)):
@@ -128,7 +120,7 @@ def lags_behind(joint: JointFit) -> bool:
 
 
 def _thinned(u: Real, y: Real, valid: Mask) -> tuple[Real, Real, Mask]:
-    """Means over blocks that are still short beside what the two have in common."""
+    """Averages over blocks that are short compared with the periods that the two share."""
     size = min(u.size, max(64, u.size // 8))
     frequency, shared = scipy.signal.csd(u, y, nperseg=size, detrend="constant")
     total = np.cumsum(np.abs(shared))
@@ -141,7 +133,7 @@ def _thinned(u: Real, y: Real, valid: Mask) -> tuple[Real, Real, Mask]:
 
 
 def _evidence(u: Real, y: Real, valid: Mask, step: int, *, lead: int = 0) -> float:
-    """Logarithm by which the past serves `u` better than `y`; 0 if there is too little to tell."""
+    """How much better the past predicts `u` than `y`, as a logarithm; 0 if too few samples."""
     rows = _rows(valid, 2 * _WEIGHTS * step)
     if rows.size < _FEWEST:
         return 0.0
@@ -149,7 +141,7 @@ def _evidence(u: Real, y: Real, valid: Mask, step: int, *, lead: int = 0) -> flo
 
 
 def _rows(valid: Mask, reach: int) -> NDArray[np.intp]:
-    """Samples all of whose neighbours within reach were measured; evenly thinned."""
+    """Samples with all neighbours within reach measured; evenly thinned."""
     lost = np.concatenate([[0], np.cumsum(~valid)])
     at = np.arange(reach, valid.size - reach)
     rows = at[lost[at + reach + 1] == lost[at - reach]]
@@ -159,7 +151,7 @@ def _rows(valid: Mask, reach: int) -> NDArray[np.intp]:
 def _future_needed(
     target: Real, source: Real, rows: NDArray[np.intp], step: int, lead: int
 ) -> float:
-    """Logarithm of what the past of `source` leaves over beside what past and future leave."""
+    """Logarithm of the residual from the past of `source` over that from past and future."""
     lags = step * np.arange(-_WEIGHTS, 2 * _WEIGHTS + 1)
     matrix = source[rows[:, None] - lags]
     matrix -= matrix.mean(axis=0)
@@ -168,9 +160,9 @@ def _future_needed(
     if power == 0.0:
         return 0.0
     past, both = slice(_WEIGHTS - lead, 3 * _WEIGHTS + 1 - lead), slice(0, 2 * _WEIGHTS + 1)
-    told = (  # by directions that the source hardly has, nothing is
+    explained = (  # not by directions in which the source has hardly any power
         product[at] @ np.linalg.pinv(gram[at, at], rcond=_UNSEEN, hermitian=True) @ product[at]
         for at in (past, both)
     )
-    alone, together = (max(0.0, 1.0 - one / power) + MATERIAL**2 for one in told)
+    alone, together = (max(0.0, 1.0 - part / power) + MATERIAL**2 for part in explained)
     return 0.5 * float(np.log(alone / together))

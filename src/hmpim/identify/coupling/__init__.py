@@ -1,9 +1,10 @@
-"""Several inputs at once: direct terms, couplings, and what cannot be told apart.
+"""Several inputs at once: direct terms, couplings, and which inputs one record distinguishes.
 
-inputs        the inputs themselves: bands, condition, copies, coherence
-output_fit    one output fitted to all inputs: which are strong, in turns, and all moved at once
-pairs         the fits on the way there: moved at once, simplified, a coupling left out
-joint_errors  the error bars, from the derivatives of all
-weak          weak couplings one by one; delay and lag where they are not told apart
-responses     the measured response to each input, and what is said of weak ones
+inputs        the inputs alone: bands, condition, copies, coherence
+output_fit    one output fitted to all inputs: the strong ones, in turns, then all at once
+pairs         the state of that search: fits moved at once, simplified, couplings dropped
+joint_errors  error bars from the derivatives of all pairs
+weak          weak couplings one by one; delay and lag where only their sum is known
+residual      whether the residual still follows an input
+responses     measured response to each input, and findings on weak couplings
 """

@@ -1,9 +1,10 @@
-"""The inputs of a simultaneous test by themselves: whether one record tells them apart.
+"""The inputs of a simultaneous test alone: whether one record distinguishes them.
 
-Around each frequency every input has a polynomial of neighbouring bins to itself, as in
-`hmpim.identify.frf.multivariable`. Where those of two inputs span the same, nothing tells which of
-them an output follows: one of them is a copy of the other, scaled, filtered, or passing that
-frequency at the same time and speed. The direction in which the least is known names them.
+Around each frequency, every input is multiplied by a polynomial over neighbouring bins, as in
+`hmpim.identify.frf.multivariable`. If these of two inputs span the same space, an output that
+follows one cannot be distinguished from one that follows the other: one input is a copy of the
+other, scaled, filtered, or passing that frequency at the same time and speed. The worst-determined
+direction names them.
 """
 
 from collections.abc import Sequence
@@ -26,23 +27,15 @@ __all__ = ["input_set", "own_band"]
 _POINTS = 240
 _TERMS = 3
 _SINGULAR = 1e6
-"""Condition beyond which it is rounding, and infinite."""
+"""Condition beyond which it is rounding, and taken as infinite."""
 
 
 def own_band(u: Real, fs: float, stated: tuple[float, float] | None) -> tuple[float, float]:
     """Band that one of several inputs excites, in Hz.
 
-    A band that is stated for the record holds for all inputs together; of it counts what this
-    input reaches with a thousandth of its power or so (50 dB down).
-
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        The input.
-    fs : float
-        Hz.
-    stated : tuple of float or None
-        Band stated for the record.
+    `u`, (n,), is the input, `fs` the rate in Hz, and `stated` the band stated for the record, in
+    Hz. A stated band holds for all inputs together; this input's own part is where its power is
+    above about a thousandth of its maximum (50 dB down).
 
     Examples
     --------
@@ -69,18 +62,10 @@ def input_set(
     *,
     stated: tuple[float, float] | None = None,
 ) -> InputSet:
-    """Look at which inputs one record tells apart, and where.
+    """Find which inputs one record distinguishes, and where.
 
-    Parameters
-    ----------
-    inputs : sequence of ndarray, shape (n,)
-        On one clock; each one moves.
-    names : sequence of str
-        One for each.
-    fs : float
-        Hz.
-    stated : tuple of float or None
-        Band stated for the record, Hz.
+    The inputs, (n,), are sampled on one clock at a rate in Hz, and none is constant; each has a
+    name. `stated` is the band stated for the record, in Hz.
 
     Examples
     --------
@@ -135,7 +120,7 @@ def _conditions(spectra: Sequence[Complex], centre: NDArray[np.int64]) -> tuple[
     for j in range(m):
         slope[:, j, j * _TERMS : (j + 1) * _TERMS] = place
     slope = slope / size[windows.near]
-    # Errors of the responses at the centre, all together and each input by itself.
+    # Errors of the responses at the centre, of all inputs together and of each alone.
     _, values, right = np.linalg.svd(unit, full_matrices=False)
     least = np.maximum(values, 1e-12 * values[:, :1])
     mapped = slope @ np.conj(right.swapaxes(1, 2)) / least[:, None, :]
@@ -155,7 +140,7 @@ def _conditions(spectra: Sequence[Complex], centre: NDArray[np.int64]) -> tuple[
 def _alike(
     involved: Sequence[tuple[str, ...]], frequency: Real, active: Mask, names: tuple[str, ...]
 ) -> tuple[Alike, ...]:
-    """Gather the frequencies at which the same inputs are not told apart."""
+    """Collect the frequencies at which the same inputs cannot be distinguished."""
     found = []
     for group in sorted({g for g in involved if g}, key=lambda g: -list(involved).count(g)):
         here = np.array([g == group for g in involved])

@@ -1,4 +1,4 @@
-"""Error bars of several inputs: from the derivatives of all that they make of one output."""
+"""Error bars with several inputs: from the derivatives of one output with respect to all pairs."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -6,30 +6,29 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.weak import Lag, lag_of
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 
-__all__ = ["common", "covariances", "derivatives", "gained_by", "own_lag"]
+__all__ = ["common", "covariances", "derivatives", "gained_by"]
 
 _UNSEEN = 1e-13
-"""Share of the greatest eigenvalue below which the record does not see a direction."""
+"""Share of the greatest eigenvalue below which the record does not determine a direction."""
 
 
 def common(masks: Iterable[Mask | None]) -> Mask | None:
-    """Samples that count for all, shape (n,); None where all do."""
-    told = [mask for mask in masks if mask is not None]
-    counted = np.logical_and.reduce(told) if told else np.ones(1, dtype=bool)
+    """Samples that count in all masks, shape (n,); None if all do."""
+    known = [mask for mask in masks if mask is not None]
+    counted = np.logical_and.reduce(known) if known else np.ones(1, dtype=bool)
     return None if counted.all() else np.asarray(counted)
 
 
 def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, list[Real], Real]:
-    """Derivatives of each pair but by the bias, on the samples that count for all, and by the bias.
+    """Derivatives by each pair's parameters without the bias, and by the bias, where all count.
 
-    What is not asked for, drift and the states that the inputs begin with, is projected out of all.
+    Other unknowns, the drift and the initial states, are projected out of all.
     """
     problem = replace(
         fits[-1].problem,
@@ -37,7 +36,7 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
         whitening=whitening,
         begins=None,
     )
-    ones, blocks, others = np.ones((1, problem.y.size)), [], []
+    blocks, others, bias = [], [], problem.masked(np.ones((1, problem.y.size)))
     for fit in fits:
         own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
         part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
@@ -47,30 +46,17 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
     if problem.nuisance is not None:
         others.append(problem.nuisance)
     given = problem.masked(np.vstack(others))
-    bias = problem.masked(ones)
     if given.shape[0]:
         edges = np.cumsum([block.shape[0] for block in blocks])
         *blocks, bias = np.split(without(np.vstack([*blocks, bias]), given), edges)
     return problem, blocks, bias
 
 
-def own_lag(problem: Problem, pair: JointFit, others: list[Real]) -> Lag | None:
-    """Delay and lag of one of the pairs, if it is of no more than first order.
-
-    `others` are the derivatives of the other pairs and by the bias.
-    """
-    fit = pair.best.fit
-    if fit.structure.name not in ("static", "first_order"):
-        return None
-    own = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
-    return lag_of(own, fit, np.vstack(others))
-
-
 def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real) -> list[Real]:
     """Covariance of each pair's parameters and the bias, from all derivatives together."""
     rows = np.vstack([*blocks, bias])
     residual = problem.masked(last.best.fit.residual)
-    # What the noise is whitened by is None only where it is white already.
+    # Without whitening, the noise is white already.
     full = _joint_covariance(rows, residual, freedom=max(problem.counted - rows.shape[0], 1))
     end, start, out = rows.shape[0] - 1, 0, []
     for block in blocks:
@@ -81,10 +67,10 @@ def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real
 
 
 def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float:
-    """Log-likelihood that one pair's gain adds, all other parameters free to take over.
+    """Log-likelihood that one pair's gain adds, with all other parameters free.
 
-    Half of b' C⁻¹ b, b the pair's numerator, C its covariance, the pair's own poles and delay
-    held: without a gain they mean nothing.
+    Half of b' C⁻¹ b, with b the pair's numerator and C its covariance. Poles and delay of the pair
+    are fixed: they mean nothing without a gain.
     """
     blocks = []
     for j, (p, f) in enumerate(zip(problems, fits, strict=True)):
@@ -100,11 +86,11 @@ def gained_by(problems: Sequence[Problem], fits: Sequence[Fit], i: int) -> float
 
 
 def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
-    """Covariance under white noise; a direction that the record does not see spoils no other one.
+    """Covariance for white noise; a direction that is not determined affects no other one.
 
-    Of the derivatives of the prediction, (p, n), the bias's the last, and of what is left over,
-    (n,). The bias is taken out of the others first: where an input stands far from zero, the
-    derivative by its gain is all but the same.
+    `rows` are the derivatives of the prediction, (p, n), the bias's the last. The bias is projected
+    out of the others first: if an input is far from zero, the derivative by its gain is nearly the
+    same.
     """
     bias, mean = rows[-1], rows[:-1] @ rows[-1]
     power = max(float(bias @ bias), np.finfo(float).tiny)

@@ -1,13 +1,14 @@
-"""One output, several inputs at once: each pair's fit with the others taken out.
+"""One output, several inputs at once: each pair's fit, with the others' contributions subtracted.
 
-The input that moves the output most is fitted as if alone; others join as long as one explains
-much of what is left over, each with its own beginning and assumption between the samples. They are
-fitted in turns, each to what the others leave, until moving all at once gains little. What is weak
-beside them (`hmpim.identify.coupling.weak`) is fitted with the noise whitened.
-Then all pairs are moved at once, and only then is each coupling tested, the others allowed to take
-over: of two inputs that are alike at some frequencies, the first took a share of the other's
-coupling, which then looked like none. The error bars come from all pairs' derivatives together, so
-that inputs that resemble each other widen them.
+The input that moves the output most is fitted as if alone. Others join as long as one explains a
+large part of the residual, each with its own beginning and assumption between the samples. They are
+fitted in turns, each to the output without the others, until moving all at once gains little. Weak
+ones (`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
+
+Then all pairs are moved at once, and only then is each coupling tested, with the others free: of
+two inputs that are alike at some frequencies, the first may have explained a share of the other's
+coupling. The error bars come from all pairs' derivatives together, so inputs that resemble each
+other widen them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,10 +19,10 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives, own_lag
-from hmpim.identify.coupling.left import misfit_at_any_lag
+from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
-from hmpim.identify.coupling.weak import Lag, coupling_fit, whitening_of
+from hmpim.identify.coupling.residual import misfit_at_any_lag
+from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -45,34 +46,29 @@ from hmpim.record import Intersample
 __all__ = ["OutputFit", "fit_together", "set_free"]
 
 _TURNS = 3
-"""How often the strong inputs are fitted, each with the others known."""
+"""Times that the strong inputs are fitted, each with the others known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class OutputFit:
-    """Fits of one output to each input; by default of an output to its one input."""
+    """Fits of one output to each input; by default, to its only input."""
 
-    # one for each input; its output is what the other inputs leave over. One that the output does
-    # not follow at all is not `related`.
+    # One for each input, to the output without the other inputs' contributions; not `related` if
+    # the output does not follow the input at all.
     fits: tuple[JointFit, ...]
-    # (p_i, p_i): of each fit's parameters, all fits considered together
-    covariances: tuple[Real, ...] = ()
-    # whether the input's contribution is large beside the output, not a coupling
-    strong: tuple[bool, ...] = (True,)
-    # delay and lag of couplings of no more than first order
-    lags: tuple[Lag | None, ...] = (None,)
-    # the bias's drift; each fit's output is without it
-    drifting: Drifting | None = None
-    asked: int = 0  # the input beside which it was weighed
-    humming: Humming | None = None  # its hum, likewise
-    steady: Real | None = None  # (n,): where it drifts, what a fit with a constant bias predicts
-    # what is known of a gain that changes, of an output to one input
-    gaining: GainChange | None = None
-    bending: Modelled | None = None  # a nonlinearity of an output to one input
+    covariances: tuple[Real, ...] = ()  # (p_i, p_i): of each fit's parameters, with all fits free
+    strong: tuple[bool, ...] = (True,)  # whether the input's contribution is large, not a coupling
+    lags: tuple[Lag | None, ...] = (None,)  # delay and lag of couplings of at most first order
+    drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
+    asked: int = 0  # the input with which the drift was fitted
+    humming: Humming | None = None  # mains hum; each fit's output is without it
+    steady: Real | None = None  # (n,): with a drift, the prediction of a fit with a constant bias
+    gaining: GainChange | None = None  # a gain that changes, with one input only
+    bending: Modelled | None = None  # a nonlinearity that the model includes, with one input only
 
     @property
     def prediction(self) -> Real:
-        """What all inputs together predict of the output, bias and drift included, shape (n,)."""
+        """Output predicted from all inputs, with bias and drift, shape (n,)."""
         first = next((fit for fit in self.fits if fit.related), self.fits[0]).best.fit
         total: Real = np.full(first.prediction.size, first.linear[-1])
         for fit in self.fits:
@@ -82,7 +78,7 @@ class OutputFit:
 
     @property
     def slow(self) -> int | None:
-        """An input whose fit may have taken a drift for its own; None where there is none."""
+        """An input whose fit may explain a drift; None without one."""
         for i, fit in enumerate(self.fits):
             if fit.related and self.strong[i] and (spans_record(fit.best.fit) or fit.lingers):
                 return i
@@ -96,7 +92,7 @@ class OutputFit:
 
     @property
     def disturbance(self) -> Real | None:
-        """What moves the output beside the model, shape (n,): drift, hum, a change of the gain."""
+        """Output motion that the linear model does not cause, (n,): drift, hum, a nonlinearity."""
         known = (self.drifting, self.humming, self.bending)
         trends = [one.trend for one in known if one is not None]
         if self.gaining is not None and self.gaining.taken:
@@ -118,64 +114,52 @@ def fit_together(
     drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
     briefly: bool = False,
 ) -> OutputFit:
-    """Fit one output to several inputs.
+    """Fit one output, (n,), to several inputs.
 
-    Parameters
-    ----------
-    inputs : list of ndarray, shape (n,)
-        Uniform samples of each input.
-    y : ndarray, shape (n,)
-        Uniform samples of the output.
-    valid, known, intersample, structures
-        As for `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together.
-    alike : sequence of (frozenset of int, ndarray of bool, shape (n // 2 + 1,))
-        Inputs that are not told apart, and the bins at which they are not. There a coupling is
-        not told from what the stronger one's model lacks.
-    nuisance : ndarray, shape (k, n), optional
-        Rows beside the bias that enter linearly, such as a drift's.
-    aside : mapping of int to JointFit
-        Inputs that are not asked, each with its fit, which is not related.
-    drifts : callable, optional
-        Fits plain dynamics with a drift, given the input that leads and its plain fit, where what
-        is strong leaves more than white noise: richer dynamics may take a drift for their own.
-        What it returns is taken, unless it is None.
-    briefly : bool
-        Whether plain dynamics of what is strong are all that is fitted; the input that leads is
-        then all that is returned.
+    `valid`, `known`, `intersample` and `structures` are as for
+    `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together. `alike` names
+    inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
+    coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
+    enter linearly, such as a drift's. Inputs `aside` are left out; each has its unrelated fit.
+
+    If the strong inputs do not leave white noise, richer dynamics may explain a drift: `drifts`
+    then fits plain dynamics with one, given the leading input and its plain fit, and its value is
+    returned unless it is None. If `briefly`, only strong inputs are fitted, with plain dynamics,
+    and only the leading input's fit is returned.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, aside=aside)
+    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, excluded=aside)
     _lead(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
     if briefly:
         pairs.refine(pairs.kept, None)
         return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
-    if drifts is not None and whitening_of(pairs.left()) is not None:
+    if drifts is not None and whitening_of(pairs.residual()) is not None:
         drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
             return drifting
-    asked = pairs.cost
+    least = pairs.cost
     _fit_couplings(inputs, pairs, plain)
     for _ in range(_TURNS):
         before = pairs.structures
         _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
-        left = pairs.cost
+        cost = pairs.cost
         pairs.refine(pairs.kept, None)
-        clearer = pairs.cost * TWICE < asked
+        clearer = pairs.cost * TWICE < least
         if clearer:
             _join(inputs, pairs, plainly)
-            asked = pairs.cost
+            least = pairs.cost
         others = pairs.structures != before
         if others or clearer:
             _fit_couplings(inputs, pairs, plain)
             pairs.refine(pairs.kept, None)
         simpler = pairs.simplify()
-        if not others and not simpler and pairs.cost * TWICE > left:
-            break  # else each was fitted to the wrong rest
+        if not others and not simpler and pairs.cost * TWICE > cost:
+            break  # otherwise each was fitted with wrong contributions of the others
     if pairs.reopen():
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
         _fit_couplings(inputs, pairs, plain)
@@ -186,21 +170,15 @@ def fit_together(
 
 
 def set_free(
-    fitted: OutputFit, inputs: list[Real], y: Real, asked: int, nuisance: Real | None
+    fitted: OutputFit, inputs: list[Real], y: Real, moving: int, nuisance: Real | None
 ) -> OutputFit | None:
-    """The same dynamics from a state that is free; None unless that leaves white noise.
+    """Fit the same dynamics with a free initial state; None unless that leaves white noise.
 
-    Parameters
-    ----------
-    fitted : OutputFit
-        As it ended beside other rows.
-    inputs, y, nuisance
-        As for `fit_together`.
-    asked : int
-        The input that may have moved before the record; others may if they move from its start.
+    `fitted` is a fit with other rows; `inputs`, `y` and `nuisance` are as for `fit_together`. The
+    input `moving` may have moved before the record, others only if they move from its start.
     """
     fits = {j: fit for j, fit in enumerate(fitted.fits) if fit.related}
-    if asked not in fits or fits[asked].best.fit.structure.integrators:
+    if moving not in fits or fits[moving].best.fit.structure.integrators:
         return None
     valid = common(fit.problem.valid for fit in fits.values())
     latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
@@ -209,70 +187,70 @@ def set_free(
         return None
 
     def freed(j: int, fit: JointFit) -> JointFit:
-        moves = j == asked or in_motion(inputs[j])
+        moves = j == moving or in_motion(inputs[j])
         begins = counted.begins if moves else None
         problem = replace(fit.problem, valid=counted.valid, nuisance=nuisance, begins=begins)
-        beside = np.zeros(0 if nuisance is None else len(nuisance))
-        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=beside))
+        weights = np.zeros(0 if nuisance is None else len(nuisance))
+        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
         first = counted.first or 0
         return replace(fit, problem=problem, best=best, trials=(best,), forgotten=first)
 
     strong = [j for j, one in enumerate(fitted.strong) if one]
-    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), aside={})
+    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), excluded={})
     for j, fit in enumerate(fitted.fits):
         pairs.put(j, freed(j, fit))
     pairs.refine(pairs.kept, None)
-    found = pairs.fits[asked]
+    found = pairs.fits[moving]
     if not found.best.fit.is_white:
         washed = washed_out(found.problem, found.best.fit)
         if washed is None:
             return None
         best = replace(found.best, fit=washed)
-        pairs.put(asked, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
+        pairs.put(moving, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
         pairs.refine(pairs.kept, None)
-    return _moved_at_once(pairs) if pairs.fits[asked].best.fit.is_white else None
+    return _moved_at_once(pairs) if pairs.fits[moving].best.fit.is_white else None
 
 
 def _moved_at_once(pairs: Pairs) -> OutputFit:
-    """All pairs moved with the noise whitened until none is left out, with the errors of all."""
-    whitening = whitening_of(pairs.left())
+    """Move all pairs at once, noise whitened, until no coupling is dropped; add the error bars."""
+    whitening = whitening_of(pairs.residual())
     if whitening is not None:
         pairs.refine(pairs.kept, whitening)
     while pairs.together(whitening):
         pairs.refine(pairs.kept, whitening)
-    told: dict[int, Real] = {}
+    errors: dict[int, Real] = {}
     lags: dict[int, Lag | None] = {}
     fits = [pairs.fits[j] for j in pairs.kept]
     if fits:
         problem, blocks, bias = derivatives(fits, whitening)
-        told = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
+        errors = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
     for k, j in enumerate(pairs.kept):
         if j not in pairs.strong:
-            lags[j] = own_lag(problem, fits[k], [*blocks[:k], *blocks[k + 1 :], bias])
+            others = np.vstack([*blocks[:k], *blocks[k + 1 :], bias])
+            lags[j] = lag_of(problem, fits[k], others)
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
-        covariances=tuple(told.get(j, np.zeros((0, 0))) for j in everyone),
+        covariances=tuple(errors.get(j, np.zeros((0, 0))) for j in everyone),
         strong=tuple(j in pairs.strong for j in everyone),
         lags=tuple(lags.get(j) for j in everyone),
     )
 
 
 def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, each strong input to what all others leave over, unless that is as before."""
+    """Fit each strong input, in place, to the output without the others, if that has changed."""
     for i in pairs.strong:
-        rest, counted = pairs.without_others(i), pairs.counted_by_others(i)
-        if not pairs.is_settled(i, rest, counted):
+        rest, counted = pairs.without_others(i), pairs.counted(j for j in pairs.kept if j != i)
+        if pairs.is_new(i, rest, counted):
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
-            pairs.settle(i, rest, counted)
 
 
 def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, the input that the output follows most."""
+    """Fit the input that the output follows most, in place."""
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
-    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once
+    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once only
     tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
     pairs.put(i, tried[i])
@@ -280,7 +258,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit, in place, inputs that much of what is left over follows, the strongest first."""
+    """Fit inputs that explain a large part of the residual, in place, the strongest first."""
     tried: dict[int, JointFit] = {}
     share, summed = _shares(inputs, pairs)
     while share:
@@ -291,26 +269,23 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and (
-            _is_followed(tried[i]) or (i in summed and _is_summed(inputs[i], tried[i], fitted))
-        ):
+        if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
-            tried, (share, summed) = {}, _shares(inputs, pairs)  # what is left is clearer now
+            tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
 
 
 def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
-    """Amplitude (r.m.s.) that correlates with an input, or its sum, where it is much of the rest.
+    """Amplitude (r.m.s.) that each input, or its sum, explains, if it is much of the residual.
 
-    And the inputs of which it is the sum alone.
-    Friction correlates with an input that does not cause it; what follows one does so over all its
-    band.
+    The second value is the inputs of which only the sum does. Friction correlates with an input
+    that does not cause it; a response to an input follows it over all its band.
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
     if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
-        counted = pairs.valid  # nothing is told of what is hardly seen
+        counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
     sums: set[int] = set()
@@ -330,9 +305,9 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
 
 
 def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
-    """Amplitude (r.m.s.) of an output that correlates with an input's sum; 0 if by chance.
+    """Amplitude (r.m.s.) that correlates with an input's sum; 0 if it may be by chance.
 
-    A sum shows the input in its increments, which of a drift are small.
+    The increments of such a response follow the input, and those of a drift are small.
     """
     moves = np.diff(rest, prepend=rest[0])
     if misfit_at_any_lag(u, moves, excited_band(u, 1.0)).probability >= rare:
@@ -347,42 +322,34 @@ def _likely(share: Mapping[int, float]) -> list[int]:
 
 
 def _is_large(fit: JointFit) -> bool:
-    """Whether an input is much of what the others leave over."""
+    """Whether an input explains a large part of the output without the others."""
     counts = slice(None) if fit.problem.valid is None else fit.problem.valid
-    left = fit.problem.y - constant_of(fit)
-    return float(np.std(contribution(fit)[counts])) > PART * float(np.std(left[counts]))
+    rest = fit.problem.y - constant_of(fit)
+    return float(np.std(contribution(fit)[counts])) > PART * float(np.std(rest[counts]))
 
 
 def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
-    """Inputs that are asked and not strong."""
-    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.aside]
+    """Inputs that are neither strong nor excluded."""
+    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
 
 
-def _is_followed(tried: JointFit) -> bool:
-    """Whether what is left over follows an input, and not too late.
+def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
+    """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
-    A pole as slow as the record explains a drift as well, and what answers late enough to leave
-    out most of the record explains what the stronger inputs' models lack, such as friction.
+    A response so late that it leaves out most of the record explains errors of the stronger inputs'
+    models, such as friction. A pole as slow as the record also explains a drift: it counts only
+    if a drift explains less than the sum does.
     """
-    return not spans_record(tried.best.fit) and _is_in_time(tried)
-
-
-def _is_summed(u: Real, tried: JointFit, fitted: Callable[..., JointFit]) -> bool:
-    """Whether what is left over follows the sum of an input: a drift explains less."""
-    if not _is_in_time(tried):
+    problem, fit = tried.problem, tried.best.fit
+    if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
         return False
-    problem = tried.problem
+    slow = spans_record(fit)
+    if not slow or not summed:
+        return not slow
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
-    beside = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
-    return spans_record(beside) or tried.best.fit.cost < beside.cost
-
-
-def _is_in_time(tried: JointFit) -> bool:
-    """Whether an output answers an input, over most of the record."""
-    problem = tried.problem
-    late = max(tried.best.fit.delay, problem.begins or 0)
-    return tried.related and bool(late < MOST * problem.y.size)
+    drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
+    return spans_record(drifting) or fit.cost < drifting.cost
 
 
 def _follows_at_all(u: Real, y: Real) -> float:
@@ -392,7 +359,7 @@ def _follows_at_all(u: Real, y: Real) -> float:
 
 
 def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[StructureName, ...]) -> None:
-    """Fit, in place, all that is weak, the strongest first."""
+    """Fit all weak couplings, in place, the strongest first."""
     fits = pairs.fits
     best = fits[pairs.strong[0]]
     mode = best.best.intersample
@@ -400,13 +367,13 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     if not weak:
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
-    rest = pairs.left()
+    rest = pairs.residual()
     whitening = whitening_of(rest)
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
-    for names in (structures,) if known else (roughly, structures):  # each whitened anew
+    for names in (structures,) if known else (roughly, structures):  # whitened anew each time
         for j in sorted(weak, key=lambda j: -_follows_at_all(inputs[j], rest)):
             problem = Problem(
                 source=sources[j],
@@ -418,8 +385,8 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
             )
             fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
             pairs.put(j, fit)
-        # Not before all are right is one of them tested: alike, they take each other's share.
+        # Test none before all are fitted: inputs that are alike explain each other's share.
         while pairs.together(whitening, drop=names is structures):
             pass
-        rest = pairs.left()
+        rest = pairs.residual()
         whitening = whitening_of(rest)

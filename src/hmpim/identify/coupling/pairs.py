@@ -1,4 +1,4 @@
-"""The pairs of one output while they are fitted: what each input does, and all moved at once."""
+"""The pairs of one output during the search: each input's fit, and all moved at once."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,43 +23,40 @@ __all__ = ["Pairs", "constant_of", "contribution"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pairs:
-    """The pairs of one output, (n,), as far as they are fitted.
+    """The pairs of one output during the search; all but `y`, `valid`, `alike`, `excluded` change.
 
-    `valid` are the samples that count before any fit, `strong` the inputs that are no weak
-    couplings, the strongest first, `aside` those that are not asked; `alike` is as for
-    `fit_together`, and `masks` are the samples that each fit by itself counts; `between` is what
-    a coupling that was strong was found to do between the samples. All but `y`, `valid`, `alike`
-    and `aside` are changed in place.
+    `alike` is as for `fit_together`. A coupling that was strong keeps its assumption between the
+    samples in `between`.
     """
 
-    y: Real
-    valid: Mask | None
+    y: Real  # (n,)
+    valid: Mask | None  # samples that count before any fit
     fits: dict[int, JointFit]
-    strong: list[int]
+    strong: list[int]  # inputs that are no weak couplings, the strongest first
     alike: Sequence[tuple[frozenset[int], Mask]]
-    aside: Mapping[int, JointFit]
-    masks: dict[int, Mask | None] = field(default_factory=dict)
+    excluded: Mapping[int, JointFit]  # inputs to leave out
+    masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
     between: dict[int, Intersample] = field(default_factory=dict)
-    _seen: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
+    _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
     @property
     def kept(self) -> list[int]:
-        """The inputs that the output follows, as far as is known."""
+        """The inputs that the output is known to follow."""
         return [j for j, fit in self.fits.items() if fit.related]
 
     def without(self, some: Iterable[int]) -> Real:
-        """The output without what some of the inputs move it by."""
+        """The output without the contributions of some inputs."""
         parts = (contribution(self.fits[j]) for j in some if self.fits[j].related)
         return np.asarray(self.y - sum(parts, np.zeros(self.y.size)))
 
     def without_others(self, i: int) -> Real:
-        """The output without what all inputs but one move it by."""
+        """The output without the contributions of all inputs but one."""
         return self.without(j for j in self.fits if j != i)
 
     @property
     def cost(self) -> float:
-        """Mean square of what all of them leave over."""
-        rest, counts = self.left(), self.counted(self.kept)
+        """Mean square of the residual."""
+        rest, counts = self.residual(), self.counted(self.kept)
         return float(np.mean(np.square(rest if counts is None else rest[counts])))
 
     @property
@@ -68,61 +65,40 @@ class Pairs:
         return [self.fits[i].best.fit.structure for i in self.strong]
 
     @property
-    def spread(self) -> float:
-        """R.m.s. motion of the output."""
-        return float(np.std(self.y if self.valid is None else self.y[self.valid]))
-
-    @property
     def dominant(self) -> set[int]:
-        """Inputs that move the output so much that what their models lack passes for a coupling."""
-        least = PART * self.spread
+        """Inputs whose motion is so large that an error of their model looks like a coupling."""
+        least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def put(self, i: int, fit: JointFit) -> None:
-        """Take a fit of one input to what the others leave over, and the samples it counts.
-
-        An unrelated input masks no samples.
-        """
+        """Store one input's fit and the samples it counts; an unrelated input masks none."""
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
 
-    def settle(self, i: int, rest: Real, counted: Mask | None) -> None:
-        """Note what the whole search for one input was made on."""
-        self._seen[i] = rest, counted
-
-    def is_settled(self, i: int, rest: Real, counted: Mask | None) -> bool:
-        """Whether it was made on the same: it would end as it did."""
-        if i not in self._seen:
-            return False
-        before, counts = self._seen[i]
-        if counts is None or counted is None:
-            return counts is counted and np.array_equal(before, rest)
-        return np.array_equal(counts, counted) and np.array_equal(before, rest)
+    def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
+        """Note the data of one input's full search; whether the last one had others."""
+        before = self._searched.get(i)
+        self._searched[i] = rest, counted
+        if before is None or not np.array_equal(before[0], rest):
+            return True
+        if before[1] is None or counted is None:
+            return before[1] is not counted
+        return not np.array_equal(before[1], counted)
 
     def reopen(self) -> bool:
-        """Forget what searches were made on, where one of many poles leaves more than noise.
-
-        Returns
-        -------
-        bool
-            Whether there is one.
-        """
+        """Forget the searches' data if a fit of many poles is not white; return whether one is."""
         best = [self.fits[i].best.fit for i in self.strong]
         unsure = any(fit.structure.order > FEW_POLES and not fit.is_white for fit in best)
         if unsure:
-            self._seen.clear()
+            self._searched.clear()
         return unsure
 
     def counted(self, some: Iterable[int]) -> Mask | None:
-        """Samples at which what some of the inputs do is known."""
+        """Samples at which the contributions of some inputs are known."""
         return common([self.valid, *(self.masks[j] for j in some)])
 
-    def counted_by_others(self, i: int) -> Mask | None:
-        """Samples at which what all inputs but one do is known."""
-        return self.counted(j for j in self.kept if j != i)
-
-    def left(self) -> Real:
-        """What all of them leave over."""
+    def residual(self) -> Real:
+        """The output without any contribution or constant; 0 where not known."""
         kept = self.kept
         best = self.fits[next((i for i in self.strong if i in kept), self.strong[0])]
         rest = self.without(self.fits) - constant_of(best)
@@ -132,14 +108,14 @@ class Pairs:
     def refine(
         self, some: list[int], whitening: Real | None, y: Real | None = None
     ) -> tuple[list[Problem], list[Fit]]:
-        """Move some of the fits at once to what the output, or another `y`, is but for a bias."""
+        """Move some fits at once to match the output, or another `y`, but for a bias."""
         if not some:
             return [], []
         y = self.y if y is None else y
         begun = [self.fits[j].best.fit for j in some]
         problems, found = self._moved(some, begun, whitening=whitening, y=y)
-        for j, trial in zip(some, [self.fits[j].best for j in some], strict=True):
-            self._take(some, found, j, trial, y)
+        for j in some:
+            self._take(some, found, j, self.fits[j].best, y)
         return problems, found
 
     def _moved(
@@ -151,7 +127,7 @@ class Pairs:
         whitening: Real | None = None,
         hopeless: float = np.inf,
     ) -> tuple[list[Problem], list[Fit]]:
-        """Fits to some of the inputs, all moved at once from where they begin."""
+        """Fit some inputs at once, from where they begin."""
         fits = [self.fits[j] for j in some]
         valid = self.counted(some)
         problems = [replace(fit.problem, y=y, valid=valid, whitening=whitening) for fit in fits]
@@ -159,15 +135,15 @@ class Pairs:
         return problems, fit_all(problems, structures, thetas, hopeless=hopeless)
 
     def _take(self, some: list[int], found: list[Fit], j: int, trial: Trial, y: Real) -> None:
-        """Let one of the inputs have what was found for it in place of a trial of its own."""
+        """Replace one input's trial by what was found for it."""
         before, fit = self.fits[j], found[some.index(j)]
         rows = before.problem.fixed()[1:]
         others = (one for k, one in zip(some, found, strict=True) if k != j)
         moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
-        valid = self.counted(some)  # the residual is known where all count
+        valid = self.counted(some)  # where the residual is known
         own = replace(before.problem, y=y - sum(moved, np.zeros(y.size)), valid=valid)
         best = replace(trial, fit=fit)
-        if trial is not before.best:  # of another structure, nothing is known of one more pole
+        if trial is not before.best:  # of another structure: one more pole was not tried
             before = replace(before, rivals=(), hidden=None)
         self.fits[j] = replace(
             before,
@@ -179,21 +155,16 @@ class Pairs:
         )
 
     def simplify(self) -> bool:
-        """Take plainer dynamics for a strong input where those of the others make them as likely.
+        """Simplify strong inputs' dynamics where the others' now allow it; return whether any were.
 
-        What another input's fit had missed looked like dynamics. Weighed by Schwarz's criterion,
-        all inputs moved at once.
-
-        Returns
-        -------
-        bool
-            Whether any were taken.
+        An error of another input's model may have looked like dynamics. The structures are compared
+        by Schwarz's criterion, with all inputs moved at once.
         """
         simpler = False
         for i in sorted(self.strong, key=lambda j: -self.fits[j].best.fit.structure.parameters):
             some, joint = self.kept, self.fits[i]
             if i not in some or not joint.best.fit.is_white:
-                continue  # what is no noise is weighed by no criterion
+                continue  # the criterion is for noise only
             best, at = joint.best, some.index(i)
             count = joint.problem.counted
             least, chosen = 0.0, None
@@ -210,22 +181,17 @@ class Pairs:
                 if lost - gained < least:
                     least, chosen = lost - gained, (trial, found)
             if chosen is not None:
-                trials = [chosen[0] if j == i else self.fits[j].best for j in some]
-                for j, trial in zip(some, trials, strict=True):
-                    self._take(some, chosen[1], j, trial, self.y)
+                trial, found = chosen
+                for j in some:
+                    self._take(some, found, j, trial if j == i else self.fits[j].best, self.y)
                 simpler = True
         return simpler
 
     def demote(self) -> bool:
-        """Take those for couplings again that resemble others and stand little above the noise.
+        """Treat inputs as couplings again that resemble others and are little above the noise.
 
-        Of two inputs that are alike, the first may have taken a share of the other's: all couplings
-        are forgotten, to be fitted before one is tested.
-
-        Returns
-        -------
-        bool
-            Whether there are any.
+        Of two inputs that are alike, the first may have explained a share of the other's response:
+        all couplings are removed, to be fitted before any is tested. Returns whether there are any.
         """
         noise, dominant = float(np.sqrt(self.cost)), self.dominant
         alike = frozenset[int]().union(*(group for group, _ in self.alike))
@@ -237,18 +203,12 @@ class Pairs:
         for j in low:
             self.strong.remove(j)
             self.between[j] = self.fits[j].best.intersample
-        for j in [j for j in self.fits if low and j not in self.strong and j not in self.aside]:
+        for j in [j for j in self.fits if low and j not in {*self.strong, *self.excluded}]:
             del self.fits[j]
         return bool(low)
 
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
-        """Move all couplings at once; leave out the least if it adds nothing and may go.
-
-        Returns
-        -------
-        bool
-            Whether one was left out.
-        """
+        """Move all couplings at once; drop the weakest if it adds nothing; return if dropped."""
         dominant = self.dominant
         moved = [j for j in self.kept if j not in dominant]
         weak = [j for j in moved if j not in self.strong]
@@ -261,7 +221,9 @@ class Pairs:
         for j in weak:
             k = moved.index(j)
             shared = [bins for group, bins in self.alike if j in group and group & dominant]
-            slow = _too_slow(found[k], self.y.size)
+            # If its corner is below a few periods of the record, a coupling only follows drifts.
+            slowest = slowest_time_constant(found[k].denominator)
+            slow = 2 * np.pi * slowest * TWICE > self.y.size
             gains[j] = 0.0 if slow else gained_by(_apart(problems, shared), found, k)
         least = min(weak, key=gains.__getitem__)
         if gains[least] > SEARCHED:
@@ -271,24 +233,18 @@ class Pairs:
 
 
 def contribution(fit: JointFit) -> Real:
-    """What the input contributes to the output, the bias and the rows beside it aside."""
+    """Motion of the output by the input, without the bias and other rows."""
     return np.asarray(fit.best.fit.prediction - constant_of(fit))
 
 
 def constant_of(fit: JointFit) -> Real:
-    """Bias and the rows beside it, shape (n,)."""
+    """Bias and other rows of a fit, shape (n,)."""
     best = fit.best.fit
     return np.asarray(best.linear[-1] + best.nuisance @ fit.problem.fixed()[1:])
 
 
-def _too_slow(fit: Fit, samples: int) -> bool:
-    """Whether a coupling is one of drifts only: its corner below a few periods of the record."""
-    slowest = slowest_time_constant(fit.denominator)
-    return bool(2 * np.pi * slowest * TWICE > samples)
-
-
 def _apart(problems: list[Problem], shared: list[Mask]) -> list[Problem]:
-    """The problems without the bins at which an input is not told from a stronger one."""
+    """The problems without the bins at which the input resembles a stronger one."""
     if not shared:
         return problems
     known = problems[0].whitening

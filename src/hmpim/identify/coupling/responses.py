@@ -1,4 +1,4 @@
-"""Several inputs at once: which can be told apart, the response to each, and what is weak."""
+"""Several inputs at once: measured response to each, and findings on weak or similar inputs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -8,16 +8,15 @@ from itertools import pairwise
 import numpy as np
 
 from hmpim.errors import RecordError
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
 from hmpim.identify.coupling.inputs import input_set
-from hmpim.identify.coupling.left import left_over
 from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.coupling.residual import misfits_of_inputs
 from hmpim.identify.coupling.weak import unsettled
 from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result import (
-    Alike,
     Estimate,
     FrequencyResponse,
     InputSet,
@@ -42,28 +41,25 @@ __all__ = [
 ]
 
 _UPPER = 1.2
-"""Standard deviations of |error| that a bound adds: 95 % where the gain is well seen, more else."""
-
+"""Standard deviations of |error| that a bound adds: 95 % if the gain is well known, else more."""
 
 _OF_THE_RESIDUAL = frozenset({"lack_of_fit", "unsampled_input", "uneven_noise"})
-"""Codes of doubts by which what is left over is no noise."""
+"""Codes of doubts whether the residual is noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
     """Response of one output to each input, and how much of it all inputs explain."""
 
-    # one for each input, at the frequencies that it excites and is told apart; `coherence` is the
-    # partial one
+    # one for each input, where it excites and is distinguished; with the partial coherence
     columns: tuple[FrequencyResponse, ...]
     coherence: OutputCoherence  # the multiple one
-    # how far what all inputs leave over still follows each
-    left: Callable[[], tuple[Misfit, ...]]
-    of_models: Callable[[], tuple[FrequencyResponse, ...]]  # columns of what the models predict
+    left: Callable[[], tuple[Misfit, ...]]  # how far the residual still follows each input
+    of_models: Callable[[], tuple[FrequencyResponse, ...]]  # columns for the models' prediction
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
-    """Look at all inputs; those that cannot be told apart are named and refused.
+    """Find which inputs the record distinguishes; refuse those that it cannot.
 
     Raises
     ------
@@ -89,28 +85,30 @@ def inputs_of(aligned: Aligned, record: Record) -> InputSet:
 
 
 def responses_of(
-    aligned: Aligned, output: Signal, told: Mask | None, joined: OutputFit, inputs: InputSet
+    aligned: Aligned, output: Signal, counts: Mask | None, joined: OutputFit, inputs: InputSet
 ) -> Responses:
-    """Response of one output to all inputs, each in its own band.
+    """Measure the response of one output to all inputs, each in its own band.
 
-    `told` are the samples of the output that say what it was, (n,); None when all do.
+    `counts` are the samples that show the output as it was, (n,); None if all do.
     """
-    pieces = _pieces(aligned, output, told, joined, inputs)
+    pieces = _pieces(aligned, output, counts, joined, inputs)
 
     def of_models() -> tuple[FrequencyResponse, ...]:
         predicted = replace(output, values=joined.prediction)
-        alone = _pieces(aligned, predicted, told, joined, inputs)
+        alone = _pieces(aligned, predicted, counts, joined, inputs)
         return tuple(_column(alone, j) for j in range(len(aligned.inputs)))
 
     return Responses(
         columns=tuple(_column(pieces, j) for j in range(len(aligned.inputs))),
         coherence=OutputCoherence(
             output=output.name,
-            frequency=_joined_up([m.frequency for _, m in pieces]),
-            multiple=_joined_up([m.multiple_coherence[:, 0] for _, m in pieces]),
+            frequency=np.concatenate([np.zeros(0), *(m.frequency for _, m in pieces)]),
+            multiple=np.concatenate(
+                [np.zeros(0), *(m.multiple_coherence[:, 0] for _, m in pieces)]
+            ),
         ),
         left=cache(
-            lambda: left_over(
+            lambda: misfits_of_inputs(
                 [source.values for source in aligned.inputs],
                 joined.fits,
                 [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
@@ -121,14 +119,14 @@ def responses_of(
 
 
 def _pieces(
-    aligned: Aligned, output: Signal, told: Mask | None, joined: OutputFit, inputs: InputSet
+    aligned: Aligned, output: Signal, counts: Mask | None, joined: OutputFit, inputs: InputSet
 ) -> list[tuple[list[int], ResponseMatrix]]:
-    """Responses in each band, and the inputs that they are to.
+    """Responses in each band, and the inputs that they belong to.
 
-    The band is cut where an input's own begins or ends; what an input beyond its band still
-    moves is taken out by its model.
+    The band is cut where one of the inputs' begins or ends. The response to an input outside its
+    band is subtracted by its model.
     """
-    # One delay for all inputs: moving them against each other would make them look different.
+    # One delay for all inputs: shifting them relative to each other would make them look different.
     kept = [fit for fit, strong in zip(joined.fits, joined.strong, strict=True) if strong]
     strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
     delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
@@ -154,7 +152,7 @@ def _pieces(
             aligned.fs,
             delays=[[delay]],
             band=(low, high),
-            valid=told,
+            valid=counts,
             fill=modelled[None, :],
             points=200,
             names=[*(aligned.inputs[j].name for j in active), output.name],
@@ -163,31 +161,30 @@ def _pieces(
     return pieces
 
 
-def _joined_up(arrays: list[Real]) -> Real:
-    return np.concatenate(arrays) if arrays else np.zeros(0)
-
-
 def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
-    """One input's response at the frequencies where the inputs can be told apart."""
+    """One input's response at the frequencies where the inputs are distinguished."""
     own = [(m, active.index(j), m.usable) for active, m in pieces if j in active]
-    response = [m.response[told, 0, k] for m, k, told in own]
     return FrequencyResponse(
-        frequency=_joined_up([m.frequency[told] for m, _, told in own]),
-        response=np.concatenate(response) if response else np.zeros(0, dtype=np.complex128),
-        std=_joined_up([m.std[told, 0, k] for m, k, told in own]),
-        coherence=_joined_up([m.partial_coherence[told, 0, k] for m, k, told in own]),
+        frequency=np.concatenate([np.zeros(0), *(m.frequency[known] for m, _, known in own)]),
+        response=np.concatenate(
+            [np.zeros(0, np.complex128), *(m.response[known, 0, k] for m, k, known in own)]
+        ),
+        std=np.concatenate([np.zeros(0), *(m.std[known, 0, k] for m, k, known in own)]),
+        coherence=np.concatenate(
+            [np.zeros(0), *(m.partial_coherence[known, 0, k] for m, k, known in own)]
+        ),
     )
 
 
 def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
-    """Sentence on an output that no structure follows from one of several inputs.
+    """Report that no structure describes how an output follows one of several inputs.
 
-    Either the response shows a coupling all the same, such as an inertia's, which is nothing at
-    DC; or there is none, and what it would be at most.
+    Either the response still shows a coupling, such as an inertia's, which is zero at DC; or there
+    is none above a bound.
     """
-    seen = np.abs(response.response) > DEVIATIONS * response.std
-    if response.frequency.size and np.mean(seen) > PART:
-        k = int(np.argmax(np.where(seen, np.abs(response.response), 0.0)))
+    significant = np.abs(response.response) > DEVIATIONS * response.std
+    if response.frequency.size and np.mean(significant) > PART:
+        k = int(np.argmax(np.where(significant, np.abs(response.response), 0.0)))
         level = 20 * float(np.log10(np.abs(response.response[k])))
         return Finding(
             code="weak_coupling",
@@ -215,7 +212,7 @@ def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:
 
 
 def _bound(response: FrequencyResponse) -> tuple[float, float, float] | None:
-    """Bound in dB and the band that it holds for, Hz."""
+    """Bound of the gain in dB, and the band in which it holds, Hz."""
     if response.frequency.size == 0:
         return None
     upper = np.abs(response.response) + _UPPER * response.std
@@ -224,27 +221,27 @@ def _bound(response: FrequencyResponse) -> tuple[float, float, float] | None:
 
 
 def unfound(joined: OutputFit, matrix: Responses, inputs: InputSet) -> tuple[Finding, ...]:
-    """Doubt the noise where what is left over follows an input whose response was not found."""
+    """Doubt the noise if the residual follows an input whose response was not found."""
     return tuple(
         Finding(
             code="unfound_response",
             message=f"The residual still follows input {name!r}, whose response was not found: "
-            f"about {percent(left.share)} % of the residual's power. "
+            f"about {percent(found.share)} % of the residual's power. "
             f"Excite {name!r} more, or alone.",
             severity="doubt",
             parameters=("noise_std",),
         )
-        for name, fit, left in zip(inputs.names, joined.fits, matrix.left(), strict=True)
-        if not fit.related and left.probability < FALSE_ALARM and left.share > 2 * FEW
+        for name, fit, found in zip(inputs.names, joined.fits, matrix.left(), strict=True)
+        if not fit.related and found.probability < FALSE_ALARM and found.share > 2 * FEW
     )
 
 
 def with_noise_doubted(
     pairs: Sequence[PairIdentification], joined: OutputFit
 ) -> tuple[PairIdentification, ...]:
-    """Doubt the noise of each pair of an output where that of another is doubted.
+    """Doubt the noise of each pair of an output if that of another is doubted.
 
-    All inputs leave one residual: what is no noise beside one of them is none beside the others.
+    All inputs share one residual, so a doubt about it holds for all.
     """
     found = []
     for pair, fit in zip(pairs, joined.fits, strict=True):
@@ -265,7 +262,7 @@ def with_noise_doubted(
 
 
 def _of_the_noise(finding: Finding) -> bool:
-    """Whether a finding says that the residual is no noise."""
+    """Whether a finding doubts that the residual is noise."""
     doubted = finding.severity == "doubt" and "noise_std" in finding.parameters
     return doubted and finding.code in _OF_THE_RESIDUAL
 
@@ -273,9 +270,9 @@ def _of_the_noise(finding: Finding) -> bool:
 def settled(
     pair: PairIdentification, joined: OutputFit, i: int, inputs: InputSet, fs: float
 ) -> PairIdentification:
-    """Say only what the record tells: of weak couplings, and of inputs that are alike."""
+    """Keep only what the record determines of weak couplings and of inputs that are alike."""
     parameters = pair.parameters
-    untold: list[str] = []
+    unknown: list[str] = []
     if not joined.strong[i]:
         lag = joined.lags[i]
         late, gain = unsettled(joined.fits[i])
@@ -292,12 +289,12 @@ def settled(
                 delay=seconds(lag.delay / fs, (lag.delay_std**2 + late) / fs**2),
                 time_constant=time_constant if pair.structure == "first_order" else None,
             )
-        parameters, untold = _told(parameters, inputs.bands[i])
+        parameters, unknown = _determined(parameters, inputs.bands[i])
     parameters = _finite(parameters)
     findings = list(pair.warnings)
-    if untold:
+    if unknown:
         bound = _bound(pair.frequency_response)
-        words = ", ".join(in_words(name) for name in untold)
+        words = ", ".join(in_words(name) for name in unknown)
         most = "" if bound is None else f" It is below {bound[0]:.0f} dB (95 %)."
         findings.append(
             Finding(
@@ -306,15 +303,25 @@ def settled(
                 f"outside what {pair.input!r} excites, to determine its {words}.{most} "
                 "Excite it more, or alone.",
                 severity="doubt",
-                parameters=EVERY if "scale_factor" in untold else tuple(untold),
+                parameters=EVERY if "scale_factor" in unknown else tuple(unknown),
             )
         )
     for group in inputs.alike:
         if pair.input in group.names and group.share >= PART:
             others = [inputs.names.index(name) for name in group.names if name != pair.input]
-            # A coupling too weak to be seen may have been taken for this one.
+            # A coupling too weak to be found may have been attributed to this input.
             hidden = not joined.strong[i] and not all(joined.fits[j].related for j in others)
-            findings.append(_coupled(group, doubt=group.share >= MOST or hidden))
+            findings.append(
+                Finding(
+                    code="coupled_inputs",
+                    message=f"Inputs {', '.join(group.names)} cannot be distinguished at "
+                    f"{group.where} ({100 * group.share:.0f} % of the frequencies they excite): "
+                    "there the error bars rest on the models alone. Drive them with sweeps that "
+                    "pass each frequency at different times.",
+                    severity="doubt" if group.share >= MOST or hidden else "info",
+                    parameters=MODELLED,
+                )
+            )
     return replace(pair, parameters=parameters, warnings=tuple(findings))
 
 
@@ -322,17 +329,6 @@ def _widened(known: Estimate | None, variance: float) -> Estimate | None:
     if known is None or variance == 0.0:
         return known
     return estimate(known.value, known.spread**2 + variance, unit=known.unit)
-
-
-def _coupled(group: Alike, *, doubt: bool) -> Finding:
-    return Finding(
-        code="coupled_inputs",
-        message=f"Inputs {', '.join(group.names)} cannot be distinguished at {group.where} "
-        f"({100 * group.share:.0f} % of the frequencies they excite): there the error bars rest "
-        "on the models alone. Drive them with sweeps that pass each frequency at different times.",
-        severity="doubt" if doubt else "info",
-        parameters=MODELLED,
-    )
 
 
 _WITH_GAIN = (
@@ -348,8 +344,8 @@ _WITH_GAIN = (
 )
 
 
-def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[str]]:
-    """Parameters that a weak coupling's record tells, and the names of the others."""
+def _determined(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[str]]:
+    """Parameters that a weak coupling's record determines, and the names of the others."""
 
     def loose(e: Estimate) -> bool:
         return not e.spread <= MUCH * abs(e.value)
@@ -360,35 +356,28 @@ def _told(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, list[st
     def late(e: Estimate) -> bool:
         return not e.spread <= 0.5 / band[1]
 
-    gone: set[str] = set()
-    for name, bad in (
-        ("scale_factor", loose),
-        ("time_constant", loose),
-        ("damping_ratio", loose),
-        ("natural_frequency", beyond),
-        ("bandwidth_phase90", beyond),
-        ("bandwidth_phase90_without_delay", beyond),
-        ("bandwidth_3db", beyond),
-        ("peak_gain_db", lambda e: not e.spread <= 20 * np.log10(TWICE)),
-        ("delay", late),
-        ("delay_low_frequency", late),
-    ):
-        value: Estimate | None = getattr(p, name)
-        if value is not None and bad(value):
-            gone.add(name)
+    def uncertain(e: Estimate) -> bool:
+        return not e.spread <= 20 * np.log10(TWICE)
+
+    tests = (
+        (loose, ("scale_factor", "time_constant", "damping_ratio")),
+        (beyond, ("natural_frequency", "bandwidth_phase90")),
+        (beyond, ("bandwidth_phase90_without_delay", "bandwidth_3db")),
+        (uncertain, ("peak_gain_db",)),
+        (late, ("delay", "delay_low_frequency")),
+    )
+    known = {name: getattr(p, name) for _, names in tests for name in names}
+    gone = {n for bad, names in tests for n in names if known[n] is not None and bad(known[n])}
     if "natural_frequency" in gone:
         gone |= {"damping_ratio", "peak_gain_db"}
     if "scale_factor" in gone:
         gone |= set(_WITH_GAIN) | {"delay_low_frequency", "delay_correlation"}
-    present = [n for n in gone if getattr(p, n) is not None]
-    return (
-        replace(p, **dict.fromkeys(gone, None)),
-        [name for name in _WITH_GAIN if name in present],
-    )
+    unknown = [name for name in _WITH_GAIN if name in gone and getattr(p, name) is not None]
+    return replace(p, **dict.fromkeys(gone, None)), unknown
 
 
 def _finite(p: Parameters) -> Parameters:
-    """The same without estimates whose error is no number."""
+    """The parameters without those whose error is not finite."""
     bad = [
         f.name
         for f in fields(p)

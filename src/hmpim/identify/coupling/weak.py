@@ -1,11 +1,11 @@
-"""What is weak beside the rest: a coupling, fitted with the noise whitened.
+"""Weak couplings, fitted with the noise whitened.
 
-What an axis leaves over is seldom white: friction, drift and the feet of resonances lie at low
-frequencies, where a plain sum of squares would have every coupling follow them. Here the
-residual's own spectrum weighs the sum of squares (generalised least squares: Söderström and
-Stoica, System Identification, 1989, ch. 4), the plain structures are all that is tried, and the
-one with the least criterion of H. Akaike (IEEE Trans. Autom. Control 19, 1974) is taken, which
-keeps a pole that is half told and with it the wider error bars.
+The residual of an axis is seldom white: friction, drift and the tails of resonances are at low
+frequencies, and a plain sum of squares would fit couplings to them. Here the residual's own
+spectrum weights the sum of squares (generalised least squares: Söderström and Stoica, System
+Identification, 1989, ch. 4). Only plain structures are tried, and the one with the smallest
+criterion of H. Akaike (IEEE Trans. Autom. Control 19, 1974) is chosen: it keeps a barely
+significant pole, and so the wider error bars.
 """
 
 from dataclasses import dataclass, replace
@@ -30,36 +30,27 @@ from hmpim.record import Intersample
 __all__ = ["Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
 
 _SMOOTHED = 0.1
-"""Reach of the average over the residual's periodogram, as a share of the frequency."""
+"""Half-width of the average over the residual's periodogram, as a share of the frequency."""
 
 _NARROWEST = 10
-"""Least reach of that average, in bins on either side."""
+"""Least half-width of that average, in bins."""
 
 _FLOOR = 1e-8
-"""Least power of the noise, relative to its mean."""
+"""Smallest power of the noise, relative to its mean."""
 
 _TASTE = 4
 _STEPS = 25
 
 _POINTS = 16
 _EARLIEST = -1.0
-"""Least delay of a coupling, in samples: causal, to the sample that stamps may be off."""
+"""Smallest delay of a coupling, in samples: causal, within the error of time stamps."""
 
 
 def whitening_of(residual: Real) -> Real | None:
-    """Gain at each bin after which a residual is white; None if it is white already.
+    """Gain at each bin that whitens a residual, (n // 2 + 1,); None if it is white already.
 
-    The inverse root of its periodogram, averaged over a tenth of the frequency on either side.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        0 where a sample does not count.
-
-    Returns
-    -------
-    ndarray, shape (n // 2 + 1,), or None
-        Such that the whitened residual has unit variance.
+    The inverse root of its periodogram, averaged over a tenth of the frequency on either side. The
+    residual, (n,), is 0 where a sample does not count; whitened, it has unit variance.
 
     Examples
     --------
@@ -81,23 +72,22 @@ def whitening_of(residual: Real) -> Real | None:
 def coupling_fit(
     problem: Problem, u: Real, *, intersample: Intersample, structures: tuple[StructureName, ...]
 ) -> JointFit:
-    """Fit the plain structures to what the stronger inputs leave over of an output.
+    """Fit the plain structures to the output without the contributions of stronger inputs.
 
-    Criteria are weighed with the problem's whitening, which is that of the noise; the problem that
-    is returned is without it. The input has shape (n,); what it does between its samples is as
-    found for the strongest input.
+    The criteria use the problem's whitening; the problem that is returned is without it. The input
+    has shape (n,), with its behaviour between samples as for the strongest input.
     """
     y = bridged(problem.y, problem.valid)
-    # Both whitened alike: the ratio stays, and noise at low frequencies hides no delay.
+    # Both are whitened: their ratio stays, and noise at low frequencies hides no delay.
     plain = replace(problem, valid=None)
     rough = rough_response(
         plain.masked(u), plain.masked(y), longest_delay=int(problem.longest_delay)
     )
     fits: list[Fit] = []
-    asked = tuple(name for name in structures if name in PLAIN) or PLAIN  # no more is seen of it
-    if not np.any(rough.response):  # nothing is left to tell a pole by
-        asked = ("static",)
-    for name in sorted(asked, key=lambda name: STRUCTURES[name].order):
+    tried = tuple(name for name in structures if name in PLAIN) or PLAIN
+    if not np.any(rough.response):  # nothing that could show a pole
+        tried = ("static",)
+    for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
         structure = STRUCTURES[name]
         if structure.order > 1 and fits and not _hopeful(problem, fits):
             continue
@@ -105,8 +95,8 @@ def coupling_fit(
         if name == "second_order":
             starts += [nested(fit) for fit in fits if fit.structure.name == "first_order"]
             starts += _resonances(rough, fits[0].delay if fits else float(rough.lag))
-        tried = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
-        best = min(tried, key=lambda fit: fit.objective)
+        found = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
+        best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
             best = fit_structure(problem, structure, best.theta, iterations=_STEPS)
         fits.append(best)
@@ -114,9 +104,10 @@ def coupling_fit(
         Trial(intersample=intersample, fit=fit, criterion=_akaike(problem, fit)) for fit in fits
     )
     best_trial = min(trials, key=lambda trial: trial.criterion)
+    unweighted = replace(problem, whitening=None)
     return JointFit(
-        problem=replace(problem, whitening=None),
-        weighed=replace(problem, whitening=None),
+        problem=unweighted,
+        weighed=unweighted,
         best=best_trial,
         trials=trials,
         forgotten=0,
@@ -126,14 +117,14 @@ def coupling_fit(
 
 
 def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
-    """Whether a simpler structure sees anything that a richer one might see better."""
+    """Whether a simpler structure explains anything, so that a richer one may explain more."""
     nothing = problem.masked(problem.y - fits[0].linear[-1])
     gain = np.log(float(nothing @ nothing) / max(min(fit.objective for fit in fits), 1e-300))
     return bool(0.5 * problem.counted * gain > CLEARLY)
 
 
 def _resonances(rough: RoughResponse, lag: float) -> list[Real]:
-    """Starts with a resonance, which a rough response full of noise does not show.
+    """Starting values with a resonance, which a noisy rough response does not show.
 
     Their phase at low frequencies is that of a delay by `lag`.
     """
@@ -146,34 +137,35 @@ def _resonances(rough: RoughResponse, lag: float) -> list[Real]:
 
 
 def unsettled(fit: JointFit) -> tuple[float, float]:
-    """Variance of delay (samples²) and scale factor that the choice of structure leaves open.
+    """Variance of delay (samples²) and scale factor due to the choice of structure.
 
     By Akaike's weights of the structures (K. P. Burnham and D. R. Anderson, Model Selection and
-    Multimodel Inference, 2nd ed., 2002, section 4.3), those of up to one pole taken as one.
+    Multimodel Inference, 2nd ed., 2002, section 4.3), those of up to one pole taken together.
     """
     richer = [t for t in fit.trials if t.fit.structure.order > 1]
     plainer = [t for t in fit.trials if t.fit.structure.order < 2]
     if not richer or not plainer:
         return 0.0, 0.0
-    one = min(richer, key=lambda t: t.criterion)
-    other = min(plainer, key=lambda t: t.criterion)
-    weight = 1.0 / (1.0 + np.exp(0.5 * np.clip(one.criterion - CLEARLY - other.criterion, -99, 99)))
+    rich = min(richer, key=lambda t: t.criterion)
+    simple = min(plainer, key=lambda t: t.criterion)
+    apart = rich.criterion - CLEARLY - simple.criterion
+    weight = 1.0 / (1.0 + np.exp(0.5 * np.clip(apart, -99, 99)))
     share = float(weight * (1.0 - weight))
-    delay = one.fit.delay - other.fit.delay
-    gain = float(one.fit.linear[0] - other.fit.linear[0])
+    delay = rich.fit.delay - simple.fit.delay
+    gain = float(rich.fit.linear[0] - simple.fit.linear[0])
     return share * delay**2, share * gain**2
 
 
 def _akaike(problem: Problem, fit: Fit) -> float:
     tiny = np.finfo(float).tiny
     count = problem.counted
-    owed = 2 * fit.structure.parameters + (CLEARLY if fit.structure.order > 1 else 0.0)
-    return float(count * np.log(max(fit.objective, tiny) / count) + owed)
+    price = 2 * fit.structure.parameters + (CLEARLY if fit.structure.order > 1 else 0.0)
+    return float(count * np.log(max(fit.objective, tiny) / count) + price)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lag:
-    """What the record says of delay and lag together, in samples: mean and deviation over lags."""
+    """Mean and standard deviation of delay and lag, averaged over all lags, in samples."""
 
     delay: float
     delay_std: float
@@ -181,18 +173,22 @@ class Lag:
     time_constant_std: float
 
 
-def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
-    """Sum the likelihood over lags of a static or first-order fit; None if no lag gives a delay.
+def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
+    """Average over lags of a coupling; None if it has two poles, or if no lag is possible.
 
-    At low frequencies a delay and a first-order lag turn the phase alike, and a weak coupling is
-    told at low frequencies best. The likeliest split of the two then says little, and bars around
-    it less: a lag of zero looks certain where it is only not seen. So the likelihood is summed over
-    all lags, each with its own best delay (a flat prior on the lag: Sivia and Skilling, Data
-    Analysis, 2nd ed., Oxford 2006, ch. 3).
+    At low frequencies, where a weak coupling is known best, a delay and a first-order lag have the
+    same phase. The likeliest split between them then means little, and its error bars less: a lag
+    of zero looks certain where it is only not visible. So the likelihood is summed over all lags,
+    each with its own best delay (a flat prior on the lag: Sivia and Skilling, Data Analysis,
+    2nd ed., Oxford 2006, ch. 3).
 
-    The problem's output is what the other inputs leave over; `others`, (k, n), are the derivatives
-    by all other parameters, whitened, which are free to give way.
+    The problem has the samples that count and the whitening; `others`, (k, n), are the whitened
+    derivatives by all other parameters, which stay free.
     """
+    fit = pair.best.fit
+    if fit.structure.name not in ("static", "first_order"):
+        return None
+    problem = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
     basis, _ = np.linalg.qr(others.T)
 
     def clean(rows: Real) -> Real:
@@ -202,33 +198,28 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
     y = clean(problem.y)
     total = fit.delay + (float(np.exp(fit.theta[1])) if fit.theta.size > 1 else 0.0)
     top = max(2.0 * total, 4.0)
-    found: list[tuple[float, float, float, float]] = []
-    for _ in range(2):  # the second time no further than the first had anything
-        found = []
+    for _ in range(2):  # the second time, only as far as any lag was likely
+        found: list[tuple[float, float, float, float]] = []
         for lag in top * (np.arange(_POINTS) / (_POINTS - 1.0)):
-            held = max(float(lag), FEW)
             delay = total - float(lag)
-            rows = _answers(problem, delay, held)
-            seen = clean(rows)
-            gram = seen @ seen.T
+            rows = _lag_rows(problem, delay, max(float(lag), FEW))
+            counted = clean(rows)
+            gram = counted @ counted.T
             if not np.linalg.cond(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))) < 1e10:
                 continue
-            gain, slope = np.linalg.solve(gram, seen @ y)
-            left = y - np.array([gain, slope]) @ seen
+            gain, slope = np.linalg.solve(gram, counted @ y)
+            residual = y - np.array([gain, slope]) @ counted
             shift = -slope / gain
             variance = float(np.linalg.inv(gram)[1, 1]) / gain**2
-            found.append((float(lag), delay + shift, variance, float(left @ left)))
-        likely = [p for p in found if p[1] >= _EARLIEST]
+            found.append((float(lag), delay + shift, variance, float(residual @ residual)))
+        likely = [point for point in found if point[1] >= _EARLIEST]
         if not likely:
             return None
-        costs = np.array([p[3] for p in likely])
+        lags, delays, variances, costs = np.array(likely).T.copy()
         sigma2 = float(costs.min()) / max(problem.counted - others.shape[0] - 3, 1)
         weight = np.exp(-0.5 * (costs - costs.min()) / sigma2)
-        reached = max(p[0] for p, w in zip(likely, weight, strict=True) if w > FALSE_ALARM)
-        top = min(1.3 * reached + FEW, top)
-    lags = np.array([p[0] for p in likely])
-    delays = np.array([p[1] for p in likely])
-    variances = sigma2 * np.array([p[2] for p in likely])
+        top = min(1.3 * float(lags[weight > FALSE_ALARM].max()) + FEW, top)
+    variances *= sigma2
     weight /= weight.sum()
     delay, lag = float(weight @ delays), float(weight @ lags)
     step = lags[1] - lags[0] if lags.size > 1 else 0.0
@@ -240,8 +231,8 @@ def lag_of(problem: Problem, fit: Fit, others: Real) -> Lag | None:
     )
 
 
-def _answers(problem: Problem, delay: float, lag: float) -> Real:
-    """Responses of e^(-sτ)/(1 + Ts) and of s times that, the level before the record included."""
+def _lag_rows(problem: Problem, delay: float, lag: float) -> Real:
+    """Responses of e^(-sτ)/(1 + Ts) and of s times that, with the level before the record."""
     rows = delayed_response(problem.source, delay=delay, denominator=np.array([1.0, lag]), powers=2)
     rows[0] += problem.source.first
     return rows

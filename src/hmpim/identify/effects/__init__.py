@@ -1,11 +1,12 @@
-"""The rest of Fig. 1: what a sensor does to its output besides dynamics.
+"""What a sensor does to its output besides dynamics (Fig. 1).
 
-imperfections   all of them found, and the fit refined for them
-said            what is said of them, and the figures read off them
-saturation, smeared   clipped levels, exact or behind noise
-hold, held      a data hold: period and phase, and the fit at its updates
-censored        the fit that counts clipped and held samples as what they are
-quantization    the rounding step
-lost            spikes and standstills
-drift           a bias that drifts, fitted with the model
+imperfections   detect all of them, and refine the fit for them
+said            findings and parameters for the result
+saturation, smeared   clipping levels, exact or covered by noise
+hold, held      data hold: period and phase; the model at its updates
+censored        maximum likelihood with clipped and held samples
+quantization    rounding step
+lost            spikes, repeated frames and standstills
+drift, gain, hum      a bias or gain that changes, and mains hum, fitted with the model
+disturbance     what drift and hum share: rows of the fit
 """

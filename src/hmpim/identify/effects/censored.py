@@ -1,10 +1,9 @@
-"""Maximum likelihood where the output was clipped, or held.
+"""Maximum likelihood for an output that was clipped, or held.
 
-A clipped sample does not say what the output was, but it says that it was beyond the level.
-Its likelihood is the chance of that (J. Tobin, Econometrica 26, 1958), so neither scale
-factor nor dynamics are pulled towards the clipped values, nor is the noise. If the noise was
-added after the clipping, the model's output is clipped instead, and the squares of the
-difference count. A held output is compared with the model at the instants of its updates.
+A clipped sample says only that the output was beyond the level. Its likelihood is the probability
+of that (J. Tobin, Econometrica 26, 1958), so clipped values bias neither the model nor the noise.
+If the noise was added after the clipping, the prediction is clipped instead, and the squared
+residuals count. A held output is compared with the model at the instants of its updates.
 
 Newton's method on all parameters and ln σ together; the derivatives of the logarithm of a
 normal tail are A. C. Cohen's, Technometrics 1, 1959.
@@ -30,57 +29,43 @@ from hmpim.identify.worth import NEARLY
 __all__ = ["CensoredFit", "fit_censored"]
 
 _LARGEST_STEP = 0.5
-"""Most that a parameter of the dynamics may change in one step, relative to its size above 1."""
+"""Largest change of a parameter of the dynamics in one step, relative to its size above 1."""
 
 _MOST_STEPS = 50
-"""At most so many are taken."""
+"""Largest number of steps."""
 
 _NEGLIGIBLE = 1e-6
-"""Rise of the log-likelihood, Newton's prediction, at which the fit is done."""
+"""The search ends when Newton's step predicts a smaller rise of the log-likelihood."""
 
 _FAR = 1e9
-"""Deviations from a level at which the tail of the normal distribution is still told."""
+"""Standard deviations from a level up to which the normal tail can be computed."""
 
 _LEVELS_MOVE = 10
-"""Steps after which levels under noise stay as they are: their scatter is far below the noise."""
+"""Steps after which levels covered by noise are fixed: their scatter is far below the noise."""
 
 _LEAST_NOISE = 1e-9
-"""Least standard deviation of the noise, over that of the output."""
+"""Smallest standard deviation of the noise, relative to that of the output."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CensoredFit:
-    """Where a fit to a clipped or held output ended.
+    """A fit to a clipped or held output."""
 
-    Parameters
-    ----------
-    fit : Fit
-        `prediction` is the output without clipping, and with the hold; `residual` is the
-        difference expected given what was read: 0 on average, smaller where clipped.
-        `cost` over samples less parameters is `noise_std` squared.
-    noise_std : float
-        Standard deviation of the noise, in the output's unit.
-    noise_std_std : float
-        Standard deviation of that.
-    covariance : ndarray, shape (p, p)
-        Of `fit.theta` and `fit.linear`; widened if the residual is not white.
-    log_likelihood : float
-        For the choice among structures.
-    index : ndarray of int, shape (m,)
-        Samples that counted.
-    """
-
+    # Its prediction includes the hold but no clipping. Its residual is the expected difference
+    # given the samples: 0 on average, smaller where clipped. Its cost is `noise_std` squared, times
+    # samples less parameters.
     fit: Fit
+    # standard deviation of the noise, and of that estimate, in the output's unit
     noise_std: float
     noise_std_std: float
-    covariance: Real
+    covariance: Real  # (p, p): of `fit.theta` and `fit.linear`; widened if the residual is coloured
     log_likelihood: float
-    index: NDArray[np.intp]
+    index: NDArray[np.intp]  # (m,): samples that were used
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Data:
-    """What is compared: samples that count, and which of them are clipped."""
+    """The samples that are used, and which of them are clipped."""
 
     problem: Problem
     arrivals: Updates
@@ -96,10 +81,10 @@ class _Data:
 class _State:
     """Parameters, and value and derivatives of the log-likelihood there.
 
-    `slope` and `bend` are the derivatives by the prediction, (m,), the second one's sign
-    changed; `rows` those of the prediction by the parameters less their means `level`, which are
-    the bias's to move: beside an input far from 0 scale factor and bias would look the same.
-    `inside` are the samples that say what the output was.
+    `slope` and `bend` are the first and the negative second derivative with respect to the
+    prediction, (m,). `rows` are the derivatives of the prediction with respect to the parameters,
+    less their means `level`: at an input far from 0, gain and bias would otherwise look alike.
+    `inside` marks the samples that are not clipped.
     """
 
     fit: Fit
@@ -123,29 +108,17 @@ def fit_censored(
     arrivals: Updates | None = None,
     drift: Real | None = None,
 ) -> CensoredFit:
-    """Fit one structure to an output that was clipped.
+    """Fit one structure to an output that was clipped or held.
 
-    Parameters
-    ----------
-    problem : Problem
-        The data; `valid` leaves out samples that say nothing at all, not the clipped ones.
-    fit : Fit
-        Where to start, and the structure: a fit to the samples that are not clipped does.
-    saturation : Saturation or None
-        Levels and clipped samples; None for an output that was only held.
-    arrivals : Updates, optional
-        Samples in which a held output is updated; every sample by default.
-    drift : ndarray, shape (n,), optional
-        What was taken off the output, by which the levels move against it; none by default.
-
-    Returns
-    -------
-    CensoredFit
+    `valid` of the problem excludes invalid samples, but no clipped ones. `fit` has the structure
+    and the starting values; a fit to the samples that are not clipped is enough. `saturation` is
+    None for an output that was only held, `arrivals` for one that is updated at every sample.
+    `drift`, (n,), was removed from the output, and moves the levels.
 
     Raises
     ------
     RecordError
-        If fewer samples are left inside the range than there are parameters.
+        If too few samples are inside the range for the parameters.
 
     Examples
     --------
@@ -173,13 +146,12 @@ def fit_censored(
         while damping < 1e8:
             trial = _moved(data, state, _step(state, damping))
             if trial is not None and trial.value > state.value:
-                damping = max(damping / 10, 1e-12)
+                state, damping = trial, max(damping / 10, 1e-12)
                 break
             damping *= 10
-        else:  # no way up: the arithmetic's own floor
+        else:  # no step increases it: the limit of floating-point arithmetic
             converged = True
             break
-        state = trial if trial is not None else state
         if data.noise_after and count < _LEVELS_MOVE:
             data = _levels_again(data, state)
             state = _evaluated(data, state.fit, state.log_sigma) or state
@@ -225,7 +197,7 @@ def _data(
 
 
 def _start(data: _Data, fit: Fit) -> _State:
-    """Fit the samples inside the range, from where the given fit ended."""
+    """Return the state of a fit to the samples inside the range, started from the given fit."""
     inside = ~(data.low | data.high)
     unknown = fit.theta.size + fit.linear.size + 1
     if np.count_nonzero(inside) <= 2 * unknown:
@@ -244,8 +216,8 @@ def _start(data: _Data, fit: Fit) -> _State:
         theta[0] -= 0.5 * float(np.median(gaps)) if begun is fit else 0.5
     begun = replace(begun, theta=theta)
     rows = rows_at_updates(data.problem, begun, data.arrivals)
-    left = (data.y - begun.linear @ rows[theta.size :])[inside]
-    sigma = max(float(np.std(left)), _LEAST_NOISE * float(np.std(data.y)))
+    residual = (data.y - begun.linear @ rows[theta.size :])[inside]
+    sigma = max(float(np.std(residual)), _LEAST_NOISE * float(np.std(data.y)))
     state = _evaluated(data, begun, float(np.log(sigma)))
     if state is None:
         raise RecordError("the fit to the samples inside the range is not finite; check the data")
@@ -253,7 +225,7 @@ def _start(data: _Data, fit: Fit) -> _State:
 
 
 def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
-    """Log-likelihood and its derivatives; None where it is not finite."""
+    """Return the log-likelihood and its derivatives; None if they are not finite."""
     rows = rows_at_updates(data.problem, fit, data.arrivals)
     prediction = fit.linear @ rows[fit.theta.size :]
     if not np.all(np.isfinite(prediction)):
@@ -266,14 +238,12 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
         z = (data.y - np.clip(prediction, data.low_edge, data.high_edge)) / sigma
         inside = (prediction > data.low_edge) & (prediction < data.high_edge)
         slope, bend, cross = inside * z / sigma, inside / sigma**2, inside * 2 * z / sigma
-        value = -0.5 * z**2 - log_sigma
-        by_sigma, bend_sigma = z**2 - 1.0, 2 * z**2
     else:
         inside = ~(data.low | data.high)
         z = (data.y - prediction) / sigma
         slope, bend, cross = z / sigma, np.full(z.size, sigma**-2), 2 * z / sigma
-        value = -0.5 * z**2 - log_sigma
-        by_sigma, bend_sigma = z**2 - 1.0, 2 * z**2
+    value, by_sigma, bend_sigma = -0.5 * z**2 - log_sigma, z**2 - 1.0, 2 * z**2
+    if not data.noise_after:
         for where, edge, sign in ((data.low, data.low_edge, -1), (data.high, data.high_edge, 1)):
             if not where.any():
                 continue
@@ -306,18 +276,18 @@ def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
 
 
 def _step(state: _State, damping: float) -> Real:
-    """Newton's step, damped, on parameters scaled alike."""
-    diagonal = np.abs(np.diag(state.information))  # far from a maximum some may be below 0
+    """Return Newton's damped step, with all parameters scaled to unit curvature."""
+    diagonal = np.abs(np.diag(state.information))  # may be negative far from a maximum
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = state.information / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
-    # Where the curvature is not that of a maximum, its magnitude still sets the step.
+    # Away from a maximum, the magnitude of the curvature still sets the step.
     values = np.maximum(np.abs(values), 1e-12 * np.abs(values).max()) + damping
     return np.asarray(vectors @ ((vectors.T @ (state.score / scale)) / values) / scale)
 
 
 def _moved(data: _Data, state: _State, step: Real) -> _State | None:
-    """The state after a step, shortened where it would change the dynamics beyond recognition."""
+    """Return the state after a step, which is shortened if it changes the dynamics too much."""
     fit, unknown = state.fit, state.fit.theta.size
     room = _LARGEST_STEP * np.maximum(1.0, np.abs(fit.theta))
     room[0] = 10.0
@@ -335,7 +305,7 @@ def _moved(data: _Data, state: _State, step: Real) -> _State | None:
 
 
 def _levels_again(data: _Data, state: _State) -> _Data:
-    """Levels as the mean of what was read where the model lies beyond them."""
+    """Move the levels to the mean of the samples where the prediction is beyond them."""
     low, high = data.low_edge, data.high_edge
     below, above = state.prediction < low, state.prediction > high
     if np.count_nonzero(below) > 3:
@@ -343,11 +313,6 @@ def _levels_again(data: _Data, state: _State) -> _Data:
     if np.count_nonzero(above) > 3:
         high = high + float(np.mean((data.y - high)[above]))
     return replace(data, low_edge=low, high_edge=high)
-
-
-def _shrink(counted: int, fit: Fit) -> float:
-    """Ratio of the likeliest standard deviation to the one without bias."""
-    return float(np.sqrt(max(counted - fit.theta.size - fit.linear.size, 1) / counted))
 
 
 def _covariance(state: _State, *, white: bool) -> Real:
@@ -365,36 +330,34 @@ def _covariance(state: _State, *, white: bool) -> Real:
 
 
 def _coloured_scores(state: _State) -> tuple[Real, float]:
-    """Covariance of the scores: their size as for white noise, their correlation as measured.
+    """Covariance of the scores, sized as for white noise and correlated as measured.
 
-    Also by how much fewer samples tell the noise: 1 + 2 Σ ρ² (M. S. Bartlett, 1946).
+    The second value is the factor 1 + 2 Σ ρ² by which correlation reduces the number of samples
+    that determine the noise (M. S. Bartlett, 1946).
     """
     weighted = state.rows * np.sqrt(np.maximum(state.bend, 0.0))
     length = scipy.fft.next_fast_len(2 * state.slope.size, real=True)
     spectra = scipy.fft.rfft(weighted, length)
     omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
     power = spectrum_behind(autoregression(state.slope, state.inside), omega)
-    power /= np.mean(np.concatenate([power, power[1:-1]]))
-    fewer = float(np.mean(np.concatenate([power, power[1:-1]]) ** 2))
+    both_signs = np.concatenate([power, power[1:-1]])
+    mean = np.mean(both_signs)
+    power /= mean
+    fewer = float(np.mean((both_signs / mean) ** 2))
     power[1 : (length + 1) // 2] *= 2.0  # both signs of frequency
     return np.asarray(((spectra * power) @ spectra.conj().T).real / length), fewer
 
 
-def _with_age(covariance: Real, data: _Data) -> Real:
-    """Add what is not known of the values' age to the variance of the delay."""
-    widened = covariance.copy()
-    widened[0, 0] += data.arrivals.age_std**2
-    return widened
-
-
 def _finished(data: _Data, state: _State, converged: bool) -> CensoredFit:
     fit, counted = state.fit, state.slope.size
-    noise_std = float(np.exp(state.log_sigma)) / _shrink(counted, fit)
+    freedom = max(counted - fit.theta.size - fit.linear.size, 1)
+    noise_std = float(np.exp(state.log_sigma)) / float(np.sqrt(freedom / counted))
     expected = state.slope * float(np.exp(2 * state.log_sigma))
     residual = np.zeros(data.problem.y.size)
     residual[data.arrivals.index] = expected
     cov = _covariance(state, white=is_white(expected))
-    freedom = max(counted - fit.theta.size - fit.linear.size, 1)
+    covariance = cov[:-1, :-1].copy()
+    covariance[0, 0] += data.arrivals.age_std**2  # an error that all ages share
     return CensoredFit(
         fit=replace(
             fit,
@@ -405,7 +368,7 @@ def _finished(data: _Data, state: _State, converged: bool) -> CensoredFit:
         ),
         noise_std=noise_std,
         noise_std_std=noise_std * float(np.sqrt(max(cov[-1, -1], 0.0))),
-        covariance=_with_age(cov[:-1, :-1], data),
+        covariance=covariance,
         log_likelihood=state.value - 0.5 * counted * float(np.log(2 * np.pi)),
         index=data.arrivals.index,
     )

@@ -1,10 +1,9 @@
-"""A bias that drifts: a slow function of time, fitted together with everything else.
+"""A bias that drifts: a slow function of time, fitted together with the model.
 
-Looked for where a constant bias leaves a residual that is not white, or a rich model has a free
-response as slow as a drift. It is a polynomial, or what settles as a body does that warms up,
-exp(-t/T). Legendre's polynomials, or the exponential and its derivative with respect to T, are
-rows of the same fit, solved with bias and numerator; the error bars come from the derivatives of
-all.
+It is tried if the residual with a constant bias is not white, or if a rich model has a free
+response as slow as a drift. Its shape is a polynomial, or exp(-t/T) as of a body that warms up.
+Legendre polynomials, or the exponential and its derivative with respect to T, are rows of the same
+fit, solved with bias and numerator; the error bars come from the derivatives of all.
 """
 
 from collections.abc import Callable
@@ -33,129 +32,88 @@ from hmpim.record import Finding
 __all__ = ["Drifting", "drift_findings", "drift_rows", "is_slow", "with_drift", "with_plain_drift"]
 
 _DEGREES = (1, 2, 3, 4, 6, 8, 12, 16)
-"""Degrees of the polynomial that are weighed against each other."""
+"""Degrees of the polynomial that are compared."""
 
 _SETTLES = (-4.0, 0.7)
-"""Logarithms of the time constants, over the record, at which what settles is looked for: from
-one that is over before the fifth part of a record to one of two records."""
+"""Range of the logarithm of the time constant over the record length: from one that settles within
+the first fifth of the record to two records."""
 
 _TRIED = 16
-"""How many."""
+"""Number of time constants tried in that range."""
 
 _FEWEST = 100
-"""Samples from which on a drift is told from noise: six for each degree of the polynomial."""
+"""Fewest samples that distinguish drift from noise: six for each degree of the polynomial."""
+
+_Fitted = Callable[[Real, bool], JointFit]
+_Steadily = Callable[[JointFit], JointFit | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drifting:
-    """A fit with a bias that drifts.
+    """A fit with a bias that drifts."""
 
-    Parameters
-    ----------
-    joint : JointFit
-        Fitted to the output, the drift taken off, its polynomials free to move; the bias is the
-        mean over the record.
-    trend : ndarray, shape (n,)
-        The drift, zero on average, in the output's unit.
-    steady : bool
-        Whether it is a straight line.
-    rate, rate_std : float
-        Mean rate over the record and its standard deviation, output's unit per sample.
-    rival : Fit or None
-        The fit with a constant bias, where the odds against it are below 20.
-    """
-
-    joint: JointFit
-    trend: Real
-    steady: bool
+    joint: JointFit  # of the output without the drift, whose rows stay free; the bias is the mean
+    trend: Real  # (n,): the drift, zero on average, in the output's unit
+    steady: bool  # whether the drift is a straight line
+    # mean rate over the record and its standard deviation, in the output's unit per sample
     rate: float
     rate_std: float
-    rival: Fit | None
+    rival: Fit | None  # the fit with a constant bias, if the odds against it are below 20
 
 
 def with_drift(
-    first: JointFit,
-    fitted: Callable[[Real, bool], JointFit],
-    steadily: Callable[[JointFit], JointFit | None],
+    first: JointFit, fitted: _Fitted, steadily: _Steadily
 ) -> tuple[JointFit, Drifting | None]:
-    """Fit again with a drifting bias, where the first fit asks for it and gains by it.
+    """Fit again with a drifting bias, if the first fit suggests one and the criterion improves.
 
-    Parameters
-    ----------
-    first : JointFit
-        With a constant bias.
-    fitted : callable
-        Makes the joint fit with rows for the drift; of the plain structures only if the second
-        argument is true.
-    steadily : callable
-        Makes of a joint fit beside a drift the same with a constant bias, from a state that is
-        free, or with a washout; None if neither leaves white noise.
+    `first` has a constant bias. `fitted` makes the joint fit with rows for the drift, of plain
+    structures only if its second argument is true. `steadily` turns a joint fit with a drift into
+    one with a constant bias and a free initial state, or a washout; None if neither leaves white
+    noise.
 
-    Returns
-    -------
-    joint : JointFit
-        The fit that serves. Beside a drift the search may have found what it had missed without:
-        if a free response is all that drifts, its bias is constant.
-    drifting : Drifting or None
-        None where a constant bias serves.
+    Returns the chosen fit and the drift; None for the drift if a constant bias is enough. Even
+    then the fit may be a new one: with a drift, the search may find dynamics that it missed.
     """
-    if not _asked_for(first):
+    if not _may_drift(first):
         return first, None
     every = drift_rows(first.problem.y.size)
     joint = fitted(every, True)
     plainly = is_white(joint.best.fit.residual)
-    if not plainly:  # else the drift takes the shape of missing dynamics
+    if not plainly:  # a drift can imitate missing dynamics
         joint = fitted(every, False)
     columns = _shape(joint, every)
 
-    def gained(joint: JointFit) -> tuple[float, float]:
+    def gained(joint: JointFit) -> float | None:
+        gain = gain_by_rows(joint, len(columns), first.best.fit, first.problem)
         least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
-        return gain_by_rows(joint, len(columns), first.best.fit, first.problem), least
+        return None if gain < least else gain
 
-    gain, least = gained(joint)  # fewer rows explain no more
-    if gain < least:
-        return first, None
-    if len(columns) < len(every):  # the structure is chosen once more, now that the drift is known
+    gain = gained(joint)  # fewer rows explain no more
+    if gain is not None and len(columns) < len(every):  # choose again, with the drift known
         joint = fitted(columns, plainly)
-        gain, least = gained(joint)
-        if gain < least:
-            return first, None
+        gain = gained(joint)
+    if gain is None:
+        return first, None
     rival = first.best.fit if gain < 2 * LIKELIER else None
     return _unless_steady(joint, columns, steadily, rival)
 
 
 def with_plain_drift(
-    problem: Problem,
-    fit: Fit,
-    fitted: Callable[[Real, bool], JointFit],
-    steadily: Callable[[JointFit], JointFit | None],
+    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily
 ) -> tuple[JointFit, Drifting | None] | None:
-    """Add a drift to plain dynamics; keep it if white noise is left.
+    """Add a drift to plain dynamics; keep it if that leaves white noise.
 
-    Parameters
-    ----------
-    problem, fit
-        The data, and the best plain fit with a constant bias.
-    fitted : callable
-        Makes the joint fit of the plain structures with rows for the drift; if the second argument
-        is true, whether it leaves white noise is all that is asked.
-    steadily : callable
-        As for `with_drift`.
+    `problem` and `fit` are the data and the best plain fit with a constant bias. `fitted` makes the
+    joint fit of plain structures with rows for the drift; if its second argument is true, only
+    whether the residual is white matters. `steadily` and the values are as for `with_drift`.
 
-    Returns
-    -------
-    joint : JointFit
-        The fit that serves, beside the drift or with a constant bias.
-    drifting : Drifting or None
-        None where a free response is all that drifts.
-
-    None where a constant bias serves, where the model that a drift is added to is slow itself, and
-    where more than white noise is left.
+    None if a constant bias is enough, if the model is as slow as a drift, or if the residual is not
+    white.
     """
     columns = drift_rows(problem.y.size)
     joint = fitted(columns, True)
-    told = joint.problem.counted
-    if told < max(_FEWEST, MOST * problem.counted) or not is_white(joint.best.fit.residual):
+    counted = joint.problem.counted
+    if counted < max(_FEWEST, MOST * problem.counted) or not is_white(joint.best.fit.residual):
         return None
     columns = _shape(joint, columns)
     joint = fitted(columns, False)
@@ -168,23 +126,39 @@ def with_plain_drift(
 
 
 def _unless_steady(
-    joint: JointFit,
-    columns: Real,
-    steadily: Callable[[JointFit], JointFit | None],
-    rival: Fit | None,
+    joint: JointFit, columns: Real, steadily: _Steadily, rival: Fit | None
 ) -> tuple[JointFit, Drifting | None]:
-    """The fit beside a drift, or that with a constant bias which explains as much."""
+    """Subtract the drift from the fit, or return one with a constant bias that explains as much."""
     steady = steadily(joint)
     if steady and gain_by_rows(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
         return steady, None
-    drifting = _described(joint, columns, rival=rival)
+    weighed, fit = joint.weighed, joint.best.fit
+    weights = fit.nuisance[: len(columns)]
+    others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
+    slopes = without(weighed.masked(columns), others)
+    residual = weighed.innovations(fit.prediction, fit.residual)
+    errors = covariance(
+        slopes,
+        residual,
+        freedom=max(weighed.counted - slopes.shape[0] - others.shape[0], 1),
+        white=is_white(residual),
+    )
+    across = (columns[:, -1] - columns[:, 0]) / (weighed.y.size - 1)
+    drifting = Drifting(
+        joint=without_rows(joint, slice(len(columns))),
+        trend=weights @ columns,
+        steady=len(columns) == 1,
+        rate=float(across @ weights),
+        rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
+        rival=rival,
+    )
     return drifting.joint, drifting
 
 
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
-    """Whether a rich model has a pole as slow as the record where plain dynamics and a drift do.
+    """Whether a rich model has a pole as slow as the record, and plain dynamics with a drift do.
 
-    Of the two the drift leaves gain and bandwidths what they are.
+    If both explain the record, gain and bandwidths are right only with the drift.
     """
     fit, plain = first.best.fit, drifting.best.fit
     slow = spans_record(fit) and drifting.problem.counted >= _FEWEST  # fewer have no shape
@@ -193,7 +167,7 @@ def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
 
 
 def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> tuple[Finding, ...]:
-    """Say how the bias drifts, and doubt the noise where what is left is not `white`."""
+    """Report how the bias drifts, and doubt the noise if the residual is not `white`."""
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
     span = f"{float(np.ptp(drifting.trend)):.3g} {unit}".rstrip()
@@ -218,11 +192,11 @@ def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> 
     return drifts, unsure
 
 
-def _asked_for(joint: JointFit) -> bool:
-    """Whether what a fit leaves over is slow, or its model is as slow as a drift."""
+def _may_drift(joint: JointFit) -> bool:
+    """Whether the residual is slow, or the model is as slow as a drift."""
     fit, problem = joint.best.fit, joint.problem
     if spans_record(fit) or joint.lingers:
-        return True  # the model may have taken the drift for its own
+        return True  # the model may explain a drift
     if is_white(fit.residual):
         return False
     spread = problem.masked(problem.y - problem.y.mean())
@@ -230,12 +204,12 @@ def _asked_for(joint: JointFit) -> bool:
 
 
 def is_slow(problem: Problem, fit: Fit) -> bool:
-    """Whether what a fit leaves over is slow."""
+    """Whether the residual varies slowly."""
     counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
     residual = fit.residual[counted]
     if counted.size < _FEWEST:
         return False
-    # Of 1/f noise: polynomial k has the power of bin k / 2.
+    # In 1/f noise, polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4
     if _steepness(residual) > TWICE**2 * flicker:
         return True
@@ -243,39 +217,39 @@ def is_slow(problem: Problem, fit: Fit) -> bool:
 
 
 def _steepness(residual: Real) -> float:
-    """Mean power of the four slowest polynomials over that of bins 8 to 40."""
+    """Ratio of the mean power of the four slowest polynomials to that of bins 8 to 40."""
     columns = drift_rows(residual.size)
     columns = columns / np.linalg.norm(columns, axis=1)[:, None]
-    weights = columns @ (residual - residual.mean())
-    power = (
-        np.abs(scipy.fft.rfft(residual - residual.mean() - weights @ columns)) ** 2 / residual.size
-    )
+    centred = residual - residual.mean()
+    weights = columns @ centred
+    power = np.abs(scipy.fft.rfft(centred - weights @ columns)) ** 2 / residual.size
     level = float(np.mean(power[8:41]))
     return float(np.mean(weights[:4] ** 2)) / max(level, np.finfo(float).tiny)
 
 
 def drift_rows(size: int) -> Real:
-    """Rows of any drift that is looked for: Legendre polynomials, zero on average, shape (k, n)."""
+    """Legendre polynomials, zero on average, shape (k, n): the rows of every drift tried."""
     at = (2.0 * np.arange(size) + 1.0 - size) / size
     columns = legvander(at, _DEGREES[-1]).T[1:]
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
 def _shape(joint: JointFit, columns: Real) -> Real:
-    """Rows that serve, by Schwarz's criterion on model's residual and polynomial, shape (k, n).
+    """Choose the rows of the drift by Schwarz's criterion, shape (k, n).
 
-    The state that the record begins with gives way: it looks like a beginning of the drift.
+    They are fitted to the residual plus the drift so far. The initial state stays free, as it
+    resembles the beginning of a drift.
     """
     problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
-    left = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
-    count = problem.counted  # of a wander, the more is taken out the better
+    target = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
+    count = problem.counted  # all samples: of a random walk, the more is removed the better
     free = part_of(problem, fit.structure, fit.theta).free
     always = np.vstack([free, np.ones(problem.y.size)])
 
     def cost(shapes: Real) -> float:
         rows = np.vstack([shapes, always])[:, counts]
-        rest = left - solved(rows @ rows.T, rows @ left) @ rows
+        rest = target - solved(rows @ rows.T, rows @ target) @ rows
         return count * float(np.log(max(float(rest @ rest), np.finfo(float).tiny)))
 
     settling = _settling(problem.y.size, _slowness(problem.y.size, cost))
@@ -284,45 +258,22 @@ def _shape(joint: JointFit, columns: Real) -> Real:
 
 
 def _slowness(size: int, cost: Callable[[Real], float]) -> float:
-    """Time constant in samples of what settles, from a grid and then to its best."""
+    """Time constant in samples of a drift that settles: the best of a grid, then refined."""
+
+    def depth(log_time: float) -> float:
+        return cost(_settling(size, float(np.exp(log_time)))[:1])
+
     grid = np.log(size) + np.linspace(*_SETTLES, _TRIED)
-    near = grid[int(np.argmin([cost(_settling(size, float(np.exp(t)))[:1]) for t in grid]))]
+    near = grid[int(np.argmin([depth(t) for t in grid]))]
     step = grid[1] - grid[0]
     best = scipy.optimize.minimize_scalar(
-        lambda t: cost(_settling(size, float(np.exp(t)))[:1]),
-        bounds=(near - step, near + step),
-        method="bounded",
+        depth, bounds=(near - step, near + step), method="bounded"
     )
     return float(np.exp(best.x))
 
 
-def _settling(size: int, slowness: float) -> Real:
+def _settling(size: int, time_constant: float) -> Real:
     """exp(-t/T) and its derivative with respect to log T, zero on average, shape (2, n)."""
-    at = np.arange(size) / slowness
+    at = np.arange(size) / time_constant
     rows = np.vstack([np.exp(-at), at * np.exp(-at)])
     return np.asarray(rows - rows.mean(axis=1, keepdims=True))
-
-
-def _described(joint: JointFit, columns: Real, *, rival: Fit | None) -> Drifting:
-    """The fit with the drift taken off the output, its polynomials still free to move."""
-    problem, weighed, fit = joint.problem, joint.weighed, joint.best.fit
-    own = fit.nuisance[: len(columns)]
-    trend = own @ columns
-    others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
-    slopes = without(weighed.masked(columns), others)
-    left = weighed.innovations(fit.prediction, fit.residual)
-    weights = covariance(
-        slopes,
-        left,
-        freedom=max(weighed.counted - slopes.shape[0] - others.shape[0], 1),
-        white=is_white(left),
-    )
-    across = (columns[:, -1] - columns[:, 0]) / (problem.y.size - 1)
-    return Drifting(
-        joint=without_rows(joint, slice(len(columns))),
-        trend=trend,
-        steady=len(columns) == 1,
-        rate=float(across @ own),
-        rate_std=float(np.sqrt(max(float(across @ weights @ across), 0.0))),
-        rival=rival,
-    )

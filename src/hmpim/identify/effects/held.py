@@ -1,9 +1,9 @@
 """A model's output at the instants at which a held output was updated.
 
-A sample in which a new value arrives shows the output as it was some part of a sample
-earlier, when it was read. To the model that is one more delay, of another size for each
-sample. Responses are computed at a few such delays and interpolated between them; where the
-period is a simple fraction of samples, as 20/3, only so many delays occur and all are exact.
+A sample with a new value shows the output as it was some part of a sample earlier, when it was
+read. For the model that is one more delay, of another size at each sample. Responses are computed
+at a few such delays and interpolated between them. If the period is a simple fraction, as 20/3
+samples, only a few delays occur, and all are exact.
 """
 
 from dataclasses import replace
@@ -18,23 +18,23 @@ from hmpim.identify.fitting.fit import Fit, Problem
 __all__ = ["held_prediction", "rows_at_updates"]
 
 _EXACT = 6
-"""So many different ages are computed one by one."""
+"""Up to so many different ages are computed one by one."""
 
 _SMOOTH_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(5) / 4)
-"""Ages of the interpolation for a smooth input, degree 4, Chebyshev's second kind."""
+"""Ages for a smooth input: interpolation of degree 4, Chebyshev nodes of the second kind."""
 
 _HELD_NODES = np.linspace(0.0, 1.0, 17)
-"""Ages for a held or linear input, whose response bends between the samples; linear."""
+"""Ages for a held or linear input, whose response bends at the samples: linear interpolation."""
 
 
 def _weights(age: Real, *, smooth: bool) -> tuple[Real, ...]:
-    """Ages to compute at, shape (k,), and what each counts for each sample, shape (k, m)."""
+    """Ages to compute at, shape (k,), and the weight of each for each sample, shape (k, m)."""
     distinct, which = np.unique(np.round(age, 6), return_inverse=True)
     if distinct.size <= _EXACT:
         return distinct, np.eye(distinct.size)[:, which]
     if not smooth:
-        nodes = _HELD_NODES
-        return nodes, np.maximum(1.0 - np.abs(age - nodes[:, None]) * (nodes.size - 1), 0.0)
+        apart = np.abs(age - _HELD_NODES[:, None]) * (_HELD_NODES.size - 1)
+        return _HELD_NODES, np.maximum(1.0 - apart, 0.0)
     nodes = _SMOOTH_NODES
     share = np.ones((nodes.size, age.size))
     for i, node in enumerate(nodes):
@@ -45,10 +45,9 @@ def _weights(age: Real, *, smooth: bool) -> tuple[Real, ...]:
 
 
 def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> Real:
-    """Derivatives of the output at each update, with respect to `theta`, then `linear`.
+    """Derivatives of the output at each update with respect to `theta`, then `linear`, (p, m).
 
-    They have shape (1 + order + zeros + 2, m). The last ones, from `theta.size` on, times `linear`
-    are the output itself. `valid` is not looked at.
+    The rows from `theta.size` on, times `linear`, are the output itself. `valid` is ignored.
 
     Examples
     --------

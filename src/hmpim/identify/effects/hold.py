@@ -1,9 +1,9 @@
 """An output that is updated more slowly than it is recorded: the data hold of Fig. 1.
 
-Such an output repeats itself, then jumps. An update at time t shows in the first sample at
-or after t, so a change seen at sample c tells that c - 1 < t <= c. All changes together
-bound the period and the phase from both sides, without any noise in between: what the
-record leaves open is a small polygon, and its width is the error.
+Such an output repeats itself, then jumps. An update at time t appears in the first sample at or
+after t, so a change at sample c means c - 1 < t <= c. All changes together bound period and phase
+from both sides, without noise: the possible values form a small polygon, and its width is the
+error.
 """
 
 from dataclasses import dataclass
@@ -18,57 +18,36 @@ from hmpim.identify.worth import FEW, MOST, NEARLY, PART
 __all__ = ["Hold", "Updates", "detect_hold", "updates"]
 
 _FEWEST = 10
-"""Changes, repeats and distinct values that must be seen: a square wave has two values."""
+"""Fewest changes, repeats and distinct values: a square wave has two values."""
 
 _ROUNDING = 1e-6
-"""Samples by which an update may miss the sample that shows it, by arithmetic alone."""
+"""Samples by which arithmetic alone may move an update past the sample that shows it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """Clock of a held output.
+    """Clock of a held output."""
 
-    Parameters
-    ----------
-    period : float
-        Time between updates, s.
-    phase : float
-        Time of the first update in the record, s after its first sample.
-    std : float
-        Standard deviation of `period`, s.
-    phase_std : float
-        Standard deviation of `phase`, s. If the period is a whole number of samples the
-        record cannot tell when between two samples the update comes.
-    """
-
+    # time between updates, and its standard deviation, s
     period: float
-    phase: float
     std: float
+    # Time of the first update after the first sample, and its standard deviation, s. If the period
+    # is a whole number of samples, the time within a sample is unknown.
+    phase: float
     phase_std: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Updates:
-    """Samples in which a new value arrives, and how old it is by then.
+    """Samples in which a new value arrives, and how old it is by then."""
 
-    Parameters
-    ----------
-    index : ndarray of int, shape (m,)
-        Samples, rising.
-    age : ndarray, shape (m,)
-        Samples since the update, 0 <= age < 1.
-    age_std : float
-        Standard deviation, in samples, that all ages have in common: a delay found from them
-        is uncertain by as much.
-    """
-
-    index: NDArray[np.intp]
-    age: Real
-    age_std: float = 0.0
+    index: NDArray[np.intp]  # (m,): samples, rising
+    age: Real  # (m,): samples since the update, 0 <= age < 1
+    age_std: float = 0.0  # standard deviation of an error that all ages share, in samples
 
 
 def updates(hold: Hold, samples: int, fs: float) -> Updates:
-    """Say in which samples of a record, at a rate in Hz, a new value arrives.
+    """Return the samples of a record, at a rate in Hz, in which a new value arrives.
 
     Examples
     --------
@@ -92,9 +71,9 @@ def updates(hold: Hold, samples: int, fs: float) -> Updates:
 def detect_hold(y: Real, fs: float, prediction: Real | None = None) -> Hold | None:
     """Find the clock by which an output, (n,), is updated, if it is slower than `fs` in Hz.
 
-    What a model without a hold says, (n,), tells an output that is held from one whose input stands
-    still. None where the output is updated at every sample, changes by no steady clock, or takes
-    fewer than ten different values.
+    The prediction of a model without a hold, (n,), distinguishes a held output from an input that
+    stands still. None if the output is updated at every sample, changes by no steady clock, or
+    takes fewer than ten different values.
 
     Examples
     --------
@@ -125,7 +104,7 @@ def detect_hold(y: Real, fs: float, prediction: Real | None = None) -> Hold | No
 
 
 def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
-    """Samples that differ from the one before by more than arithmetic, or than usual."""
+    """Samples that differ from the previous one by more than rounding, or than usual noise."""
     rounding = float(8 * np.finfo(float).eps * np.max(np.abs(samples)))
     least = rounding
     if np.count_nonzero(change <= rounding) < _FEWEST:  # no repeats: noise came after the hold
@@ -136,14 +115,14 @@ def _changed(samples: Real, change: Real) -> NDArray[np.intp]:
 def _is_rich(samples: Real, change: Real, changed: NDArray[np.intp]) -> bool:
     """Whether the output takes many values, by changes of many sizes."""
     jump = change[changed - 1]
-    # A rounded ramp changes by one step each; halfway to two is more.
+    # A rounded ramp changes by one step each time; the limit is halfway to two steps.
     if np.mean(jump > (1 + MOST) * np.quantile(jump, FEW)) < FEW:
         return False
     levels = np.sort(samples[changed])
     apart = DEVIATIONS / BULK * median(change) if change.min() > 0 else 0.0
     if 1 + np.count_nonzero(np.diff(levels) > apart) >= _FEWEST:
         return True
-    # They may fill their range all the same, rather than crowd at a few levels.
+    # Noise may join the levels, yet they fill their range rather than crowd at a few values.
     cells = np.histogram(levels, bins=50)[0]
     return bool(np.count_nonzero(cells) >= _FEWEST and np.ptp(levels) > 2 * _FEWEST * apart)
 
@@ -160,18 +139,19 @@ def _moves_within(changed: NDArray[np.intp], prediction: Real) -> bool:
 def _coarse_period(
     changed: NDArray[np.intp], runs: NDArray[np.intp], shortest: int
 ) -> float | None:
-    """Period in samples at which the changes crowd on the circle, refined over longer stretches."""
-    # Just below a whole number of samples the odd run is shorter, and as rare as it is below. From
-    # further below another period crowds as well: 9/5 as 9/4.
+    """Period in samples that aligns the changes best, refined over longer and longer stretches."""
+    # Just below a whole number of samples, a shorter run is rare. From further below, another
+    # period aligns the changes as well: 9/5 as 9/4.
     low, high = max(shortest - FEW, 1 + FEW), float(shortest + 1)
-    if shortest == 1:  # 5/4 and 5/3 crowd alike; but nearly all updates show
+    if shortest == 1:  # 5/4 and 5/3 align alike, but nearly all updates are visible
         mean = float(np.mean(runs))
         low, high = max(NEARLY * mean, 1 + FEW), 1.01 * mean
         if high <= low:
             return None
     count = min(200, changed.size)
-    stretch = _densest(changed, runs, count)
-    best = low
+    stretch = 0
+    if changed.size > count:  # where the changes follow each other most closely
+        stretch = int(np.argmin(changed[count:] - changed[:-count]))
     while True:
         c = changed[stretch : stretch + count] - changed[stretch]
         finest = 0.1 * low * low / max(float(c[-1]), 1.0)
@@ -189,17 +169,9 @@ def _coarse_period(
         count = min(2 * count, changed.size - stretch)
 
 
-def _densest(changed: NDArray[np.intp], runs: NDArray[np.intp], count: int) -> int:
-    """Where `count` changes follow each other most closely."""
-    if changed.size <= count:
-        return 0
-    length = changed[count:] - changed[:-count]
-    return int(np.argmin(length))
-
-
 def _bounded(changed: Real, period: float, fs: float) -> Hold | None:
-    """Bounds of period and phase from all changes, and the middle between them."""
-    k, changed, period = _numbered(changed, period)
+    """Bound period and phase by all changes; return the middle of the bounds."""
+    k, period = _numbered(changed, period)
     allowed = int(FEW * changed.size)
     for _ in range(allowed + 1):
         interval = _feasible(k, changed, period)
@@ -222,8 +194,8 @@ def _bounded(changed: Real, period: float, fs: float) -> Hold | None:
     return None
 
 
-def _numbered(changed: Real, period: float) -> tuple[Real, Real, float]:
-    """Which update each change is, and the period by least squares."""
+def _numbered(changed: Real, period: float) -> tuple[Real, float]:
+    """Number of the update at each change, and the period by least squares."""
     phase = np.angle(np.mean(np.exp(2j * np.pi * changed / period))) * period / (2 * np.pi)
     k = np.rint((changed - phase) / period)
     for _ in range(5):
@@ -233,39 +205,39 @@ def _numbered(changed: Real, period: float) -> tuple[Real, Real, float]:
         if np.array_equal(moved, k):
             break
         k = moved
-    return k, changed, period
+    return k, period
 
 
 def _phase(k: Real, changed: Real, period: float) -> tuple[float, float]:
-    """Bounds of the phase at one period: change - 1 < phase + k period <= change."""
+    """Bounds of the phase for a period: change - 1 < phase + k period <= change."""
     rest = changed - k * period
     return float(rest.max()) - 1.0, float(rest.min())
 
 
 def _feasible(k: Real, changed: Real, period: float) -> tuple[float, float] | None:
-    """Range of periods that leave a phase; the room for it is concave in the period."""
+    """Range of periods for which a phase exists; the width of its bounds is concave."""
 
-    def room(t: float) -> float:
+    def width(t: float) -> float:
         low, high = _phase(k, changed, t)
         return high - low + _ROUNDING
 
     reach = 2.0 / float(np.ptp(k))
     left, right = period - reach, period + reach
-    for _ in range(80):  # golden section: where the room is greatest
+    for _ in range(80):  # golden section search for the greatest width
         a, b = left + 0.382 * (right - left), left + 0.618 * (right - left)
-        if room(a) < room(b):
+        if width(a) < width(b):
             left = a
         else:
             right = b
     best = 0.5 * (left + right)
-    if room(best) < 0:
+    if width(best) < 0:
         return None
 
     def edge(outside: float) -> float:
         inside = best
         for _ in range(60):
             middle = 0.5 * (inside + outside)
-            if room(middle) < 0:
+            if width(middle) < 0:
                 outside = middle
             else:
                 inside = middle

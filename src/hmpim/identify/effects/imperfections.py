@@ -1,8 +1,8 @@
-"""The rest of Fig. 1: saturation, data hold and quantisation, found and fitted as what they are.
+"""Saturation, data hold, rounding and lost samples (Fig. 1): detected, and included in the fit.
 
-Clipped samples and those between a hold's updates are left out of the first fit; then the
-likelihood of what was read is maximised, clipped samples counting as "beyond the level" and
-held ones at the instants of their updates (`hmpim.identify.effects.censored`).
+The first fit omits clipped samples and those between a hold's updates. Then the likelihood is
+maximised, in which a clipped sample is one "beyond the level", and a held one counts at the instant
+of its update (`hmpim.identify.effects.censored`).
 """
 
 from collections.abc import Sequence
@@ -20,14 +20,13 @@ from hmpim.identify.effects.lost import (
     find_repeated,
     find_spikes,
     find_stuck,
-    may_repeat,
     stands_out,
 )
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.data import prepared
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of
 from hmpim.identify.worth import FEW, NEARLY, TWICE
 from hmpim.model.dynamics import Structure
@@ -36,18 +35,18 @@ from hmpim.record import Intersample
 __all__ = ["Imperfections", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
-"""Levels that an output must take, unless its input takes as few."""
+"""Fewest different values of an output, unless its input takes as few."""
 
 _HEAD = 64
-"""First samples, of which most outputs take more values."""
+"""First samples, in which most outputs already take more values: a quick test."""
 
 _ROUNDS = 3
-"""Times that spikes are sought behind clipping: large ones hide smaller ones."""
+"""Searches for spikes after the censored fit: large ones hide smaller ones."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Imperfections:
-    """What was seen in the output itself; None where nothing was."""
+    """Imperfections detected in the output itself; None where there is none."""
 
     saturation: Saturation | None = None
     hold: Hold | None = None
@@ -59,24 +58,23 @@ class Imperfections:
     levels: int | None = None
 
     def counts_otherwise_than(self, before: "Imperfections") -> bool:
-        """Whether clipped sides differ, a hold appeared or vanished, or more samples are lost."""
-        if _sides(self.saturation) != _sides(before.saturation):
-            return True
-        if (self.hold is None) != (before.hold is None):
+        """Whether a clipped side or a hold appeared or vanished, or more samples are lost."""
+        sides_differ = _sides(self.saturation) != _sides(before.saturation)
+        if sides_differ or (self.hold is None) != (before.hold is None):
             return True
         lost, known = self.lost, before.lost
         return lost is not None and bool(np.any(lost if known is None else lost & ~known))
 
     @property
     def lost(self) -> Mask | None:
-        """Samples that say nothing at all: spikes, copies, and where the output stood still."""
+        """Samples without information: spikes, copies, and standstills."""
         every = (self.spikes, self.frozen, self.repeated, self.unsure)
-        seen = [some for some in every if some is not None]
-        return np.logical_or.reduce(seen) if seen else None
+        masks = [mask for mask in every if mask is not None]
+        return np.logical_or.reduce(masks) if masks else None
 
     @property
     def rounding(self) -> float:
-        """R.m.s. of the error of rounding; 0 where none was seen."""
+        """R.m.s. rounding error; 0 if there is no rounding."""
         return 0.0 if self.quantization is None else self.quantization.noise_std
 
     def arrivals(self, samples: int, fs: float) -> Updates | None:
@@ -84,27 +82,27 @@ class Imperfections:
         return None if self.hold is None else updates(self.hold, samples, fs)
 
     def telling(self, samples: int, fs: float) -> Mask | None:
-        """Samples that say what the output was; None when all do."""
+        """Samples that show the output as it was; None if all do."""
         lost = self.lost
         if self.saturation is None and self.hold is None and lost is None:
             return None
-        told = np.ones(samples, dtype=bool)
+        counts = np.ones(samples, dtype=bool)
         arrivals = self.arrivals(samples, fs)
         if arrivals is not None:
-            told[:] = False
-            told[arrivals.index] = True
+            counts[:] = False
+            counts[arrivals.index] = True
         if self.saturation is not None:
-            told &= ~self.saturation.clipped
+            counts &= ~self.saturation.clipped
         if lost is not None:
-            told &= ~lost
-        return told
+            counts &= ~lost
+        return counts
 
     def counting(self, valid: Mask, fs: float) -> Mask | None:
-        """Samples that are valid, and say what the output was; None when all are and do."""
-        told = self.telling(valid.size, fs)
+        """Samples that are valid and show the output as it was; None if all do."""
+        shown = self.telling(valid.size, fs)
         if bool(valid.all()):
-            return told
-        return valid if told is None else np.asarray(valid & told)
+            return shown
+        return valid if shown is None else np.asarray(valid & shown)
 
 
 def find_imperfections(
@@ -115,17 +113,16 @@ def find_imperfections(
     prediction: Real | None = None,
     inputs: Sequence[Real] = (),
 ) -> Imperfections:
-    """Look for saturation, hold, quantisation, spikes and standstill in an output, (n,).
+    """Look for saturation, hold, rounding, spikes and standstills in an output, (n,).
 
-    Samples that are not `valid` were filled in, and are on no grid. With what a first model says a
-    plateau is told from a crest, and spikes and standstill are looked for. Beside `inputs` an
-    output may take few values, or stand still to its end; none are given where that is not asked.
+    Samples that are not `valid` were filled in, and lie on no grid. The prediction of a first model
+    distinguishes a plateau from a crest, and shows spikes and standstills. `inputs` show whether
+    the output takes too few values, or stands still to its end; without them, neither is tested.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
-    clipping: Saturation | None = detect_saturation(y, prediction, step=step)
-    if not any(_sides(clipping)) or (clipping is not None and clipping.share > NEARLY):
-        clipping = None
+    levels = detect_saturation(y, prediction, step=step)
+    clipping = levels if any(_sides(levels)) and levels.share <= NEARLY else None
     hold = detect_hold(y, fs, prediction)
     spikes = frozen = None
     if hold is None and prediction is None:
@@ -135,6 +132,9 @@ def find_imperfections(
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
     repeated = find_repeated(y) if rounding is None and hold is None else None
+    unsure = None
+    if repeated is not None and valid is not None:  # a sample after a gap may be a copy
+        unsure = np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
     return Imperfections(
         saturation=clipping,
         hold=hold,
@@ -142,20 +142,20 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=repeated,
-        unsure=None if repeated is None or valid is None else may_repeat(valid),
+        unsure=unsure,
         levels=_few_levels(y, inputs),
     )
 
 
 def _sides(saturation: Saturation | None) -> tuple[bool, bool]:
-    """Whether the range was reached below, and above."""
+    """Whether the output is clipped below, and above."""
     if saturation is None:
         return False, False
     return saturation.low is not None, saturation.high is not None
 
 
 def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
-    """How many values the output takes, if they are few beside those of the inputs."""
+    """Number of values of the output, if it is small compared with the inputs'."""
     if not inputs or np.unique(y[:_HEAD]).size >= _FEWEST_LEVELS:
         return None
     levels = np.unique(y).size
@@ -166,24 +166,27 @@ def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
 def refine(
     joint: JointFit, found: Imperfections, u: Real, fs: float, disturbance: Real | None = None
 ) -> tuple[JointFit, CensoredFit] | None:
-    """Fit the chosen structure to what was read; None where there is nothing to refine.
+    """Fit the chosen structure by maximum likelihood; None if nothing was clipped or held.
 
-    `disturbance`, (n,), is what moves the output apart from its input `u`, (n,), and has been taken
-    off.
+    `disturbance`, (n,), is the motion of the output apart from its input `u`, (n,), and has been
+    subtracted.
     """
     if found.saturation is None and found.hold is None:
         return None
     problem = joint.problem
     whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
-    if problem.begins is not None and whole is not None:  # until the first state is forgotten
+    if problem.begins is not None and whole is not None:  # until the initial state has decayed
         memory = int(np.ceil(joint.best.fit.memory))
         whole[: problem.begins + min(memory, problem.y.size // 4)] = False
     arrivals = found.arrivals(problem.y.size, fs)
 
+    def assuming(mode: Intersample) -> Problem:
+        if mode == joint.best.intersample:
+            return problem
+        return replace(problem, source=prepared(u, mode, rest=problem.begins is None))
+
     def censored_fit(mode: Intersample, start: Fit, counts: Mask | None) -> CensoredFit:
-        read = replace(problem, valid=counts, nuisance=None, begins=None)
-        if mode != joint.best.intersample:
-            read = replace(read, source=prepared(u, mode, rest=problem.begins is None))
+        read = replace(assuming(mode), valid=counts, nuisance=None, begins=None)
         return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=disturbance)
 
     tried: list[tuple[Trial, CensoredFit]] = []
@@ -194,11 +197,11 @@ def refine(
             continue
         price = trial.fit.structure.parameters * float(np.log(censored.index.size))
         tried.append((replace(trial, criterion=price - 2.0 * censored.log_likelihood), censored))
-    if not tried:  # the first fit stands
+    if not tried:  # keep the first fit
         return None
     chosen = likeliest_of([trial for trial, _ in tried], "bandlimited")
     censored = next(one for trial, one in tried if trial is chosen)
-    for _ in range(_ROUNDS):  # a spike that is clipped has been taken for one of the plateau
+    for _ in range(_ROUNDS):  # a clipped spike was taken for a sample of the plateau
         spikes = _spikes(censored, found.saturation)
         if spikes is None:
             break
@@ -208,13 +211,11 @@ def refine(
     counted[censored.index] = True
     fit = replace(censored.fit, residual=censored.fit.residual * counted)
     best = replace(chosen, fit=fit)
-    if chosen.intersample != joint.best.intersample:
-        source = prepared(u, chosen.intersample, rest=problem.begins is None)
-        problem = replace(problem, source=source)
+    final = replace(assuming(chosen.intersample), valid=counted)
     refined = replace(
         joint,
-        problem=replace(problem, valid=counted),
-        weighed=replace(problem, valid=counted),
+        problem=final,
+        weighed=final,
         best=best,
         trials=_weighed_again(joint, tried, best),
         rivals=(),
@@ -226,11 +227,8 @@ def refine(
 def _weighed_again(
     joint: JointFit, tried: list[tuple[Trial, CensoredFit]], best: Trial
 ) -> tuple[Trial, ...]:
-    """All trials by the likelihood of what was read.
-
-    Those that were not refined move with the one of their assumption that was.
-    """
-    again = {_kind(trial): replace(trial, fit=left.fit) for trial, left in tried}
+    """All trials by the censored likelihood; the others shift with the one of their assumption."""
+    again = {_kind(trial): replace(trial, fit=refined.fit) for trial, refined in tried}
     again[_kind(best)] = best
     moved = {
         trial.intersample: again[_kind(trial)].criterion - trial.criterion
@@ -246,31 +244,30 @@ def _weighed_again(
 
 
 def _kind(trial: Trial) -> tuple[Intersample, Structure]:
-    """What a trial supposes."""
+    """Assumption on the input between samples, and structure of the dynamics."""
     return trial.intersample, trial.fit.structure
 
 
 def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None:
-    """Single samples that no noise of a censored fit explains, (n,); None if there are none."""
-    left = censored.fit.residual
-    inside = np.zeros(left.size, dtype=bool)
+    """Single samples that the noise of a censored fit does not explain, (n,); None without any."""
+    residual = censored.fit.residual
+    inside = np.zeros(residual.size, dtype=bool)
     inside[censored.index] = True
-    counted = left[inside]
+    counted = residual[inside]
     if saturation is not None:
         inside &= ~saturation.clipped
     if not stands_out(counted) or not inside.any():
         return None
-    bulk = float(np.median(np.abs(left[inside]))) / BULK
-    far = np.abs(left) > TWICE * DEVIATIONS * bulk
+    bulk = float(np.median(np.abs(residual[inside]))) / BULK
+    far = np.abs(residual) > TWICE * DEVIATIONS * bulk
     return far if 0 < np.count_nonzero(far) < FEW * counted.size else None
 
 
 def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
-    """The chosen trial first, and those that clipping may have put behind it.
+    """The chosen trial, and those that clipping may have made look worse.
 
-    The samples inside the range are not a fair choice: noise that would have led out of it is
-    missing. To the first fit that is a misfit, which richer structures take up, or another
-    assumption between the samples.
+    Samples inside the range are a biased selection: noise that would have led out of it is missing.
+    The first fit may explain that by a richer structure, or another assumption between the samples.
     """
     best = joint.best
     if found.saturation is None:
@@ -293,7 +290,7 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
 
 
 def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:
-    """Samples that count, clipped and held ones among them again."""
-    told, lost = found.telling(valid.size, fs), found.lost
-    whole = valid if told is None else np.asarray(valid | ~told)
+    """Samples that count, with clipped and held ones included again."""
+    shown, lost = found.telling(valid.size, fs), found.lost
+    whole = valid if shown is None else np.asarray(valid | ~shown)
     return whole if lost is None else np.asarray(whole & ~lost)

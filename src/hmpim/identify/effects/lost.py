@@ -1,8 +1,8 @@
-"""Samples that say nothing of the output: spikes, and stretches over which it stands still.
+"""Samples without information: spikes, repeated frames, and stretches of standstill.
 
-A spike is a sample or two that stand out of what the model leaves over around them, farther
-than the model's own motion there could bring. An output that repeats one value exactly, while
-the model moves on, was not updated, was cut off, or read a fixed word in its place.
+A spike is a sample or two that stand out of the residual around them, farther than the motion of
+the model explains. An output that repeats one value exactly, while the model moves on, was not
+updated, was cut off, or is a fixed word.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,6 @@ __all__ = [
     "find_repeated",
     "find_spikes",
     "find_stuck",
-    "may_repeat",
     "stand_out",
     "stands_out",
 ]
@@ -32,11 +31,11 @@ _FEWEST_EQUAL = 8
 """Equal samples in a row from which an output may stand still."""
 
 _LONGEST_COPY = 3
-"""Samples in a row that may be copies of a frame before a lost one."""
+"""Most samples in a row that copy the frame before a lost one."""
 
 
 def stands_out(residual: Real) -> bool:
-    """Whether any sample is far beyond the bulk of a residual; quick, without a model.
+    """Whether any sample is far beyond the bulk of a residual; quick, needs no model.
 
     Examples
     --------
@@ -48,7 +47,7 @@ def stands_out(residual: Real) -> bool:
 
 
 def stand_out(residuals: Real) -> Mask:
-    """The same of many residuals, shape (..., n): which of them, shape (...)."""
+    """The same for many residuals, shape (..., n): which of them have such a sample, (...)."""
     some = slice(None, None, every_of(residuals.shape[-1]))
     away = np.abs(residuals - np.median(residuals[..., some], axis=-1, keepdims=True))
     bulk = np.median(away[..., some], axis=-1)
@@ -57,9 +56,9 @@ def stand_out(residuals: Real) -> Mask:
 
 
 def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Mask | None:
-    """Return the samples of an output that are spikes beside what a first model says, or None.
+    """Return the samples that are spikes compared with a first model's prediction, or None.
 
-    Clipped ones are not looked at.
+    `clipped` samples are ignored.
 
     Examples
     --------
@@ -82,7 +81,7 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     spread = np.median(np.abs(around - level[:, None]), axis=1) / BULK
     away = np.abs(residual - level)
     motion = np.ptp(sliding_window_view(np.pad(prediction, 1, mode="edge"), 3), axis=1)
-    # A sample that comes late is off by its motion at most, and is no spike.
+    # A late sample differs by its motion at most, and is no spike.
     moving = np.clip(TWICE * DEVIATIONS * _spread_by_speed(away, motion), motion, TWICE * motion)
     away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), moving)
     for a, b in zip(*runs_of(away), strict=True):
@@ -92,9 +91,9 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
 
 
 def _spread_by_speed(away: Real, motion: Real) -> Real:
-    """Deviation at each sample, (n,), that its motion explains: of those that move as fast.
+    """Deviation at each sample that its motion explains, (n,), from samples that move as fast.
 
-    What is off in time, or in the model, leaves a share of the motion, at an edge in one of three.
+    An error in time, or of the model, is a share of the motion, at an edge in one sample of three.
     """
     order = np.argsort(motion)
     largest = sliding_window_view(np.pad(away, 1, mode="edge"), 3).max(axis=1)
@@ -109,7 +108,7 @@ def _spread_by_speed(away: Real, motion: Real) -> Real:
 def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     """Return the samples at which the output stands still while the model moves, or None.
 
-    `step` is that to which the output is rounded, in its unit; 0 for none.
+    `step` is the rounding step of the output, in its unit; 0 for none.
 
     Examples
     --------
@@ -137,8 +136,8 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
 def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
     """Return the samples at which the output stands still to its end while an input moves, or None.
 
-    Without a model, and so before there is one: a sensor that is stuck for a good part of its
-    record spoils the first fit. What stands at its lowest or highest value is clipped.
+    It needs no model, and runs before the first fit, which a sensor stuck for much of the record
+    would spoil. A standstill at the lowest or highest value is clipping.
 
     Examples
     --------
@@ -164,9 +163,9 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
 def find_repeated(y: Real) -> Mask | None:
     """Return the samples that repeat the one before to the last digit, while all around moves.
 
-    A frame that was lost is often filled by the one before it. An output that is rounded, held or
-    at rest repeats itself too, but not for a sample or two now and then. Two alike at the highest
-    or lowest value may be clipped: alone they tell of no lost frame, beside others they are one.
+    A lost frame is often replaced by the one before. An output that is rounded, held or at rest
+    repeats itself too, but not for just a sample or two now and then. Equal samples at the highest
+    or lowest value may be clipped: they count only in addition to others.
 
     Examples
     --------
@@ -187,14 +186,3 @@ def find_repeated(y: Real) -> Mask | None:
         elif y[a] not in extreme:
             inside += b - a
     return copies if inside >= max(3, WORTH * y.size) else None
-
-
-def may_repeat(valid: Mask) -> Mask:
-    """Samples that come after one that is not valid: where frames repeat, they may be its copies.
-
-    Examples
-    --------
-    >>> may_repeat(np.array([True, False, False, True, True])).tolist()
-    [False, False, False, True, False]
-    """
-    return np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))

@@ -1,10 +1,10 @@
 """The step to which a signal was rounded: an encoder's count, a converter's least bit.
 
-Two ways to see it. If nothing was added after rounding, all values lie on one grid and the
-distances between neighbouring distinct values are whole multiples of the step. If a little
-noise, or interpolation to another clock, came after, the values still cluster on the grid,
-and the mean of exp(2πi y/Δ) stands out at Δ = step (the characteristic function of a
-rounded signal repeats: B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 4).
+There are two tests. If nothing was added after rounding, all values lie on one grid, and the
+distances between neighbouring distinct values are whole multiples of the step. If a little noise,
+or interpolation to another clock, came after, the values still cluster on the grid, and the mean of
+exp(2πi y/Δ) stands out at Δ = step (the characteristic function of a rounded signal repeats:
+B. Widrow and I. Kollár, Quantization Noise, 2008, ch. 4).
 """
 
 from dataclasses import dataclass
@@ -20,46 +20,34 @@ from hmpim.identify.worth import FEW, MOST, NEARLY, PART, TWICE
 __all__ = ["Quantization", "detect_quantization", "is_predicted"]
 
 _FEWEST_LEVELS = 5
-"""A square wave has two levels, with its rest three; that is no rounding."""
+"""Fewest levels: a square wave has two, or three with its rest, and is not rounded."""
 
 _FINEST = 2.0**-22
-"""Step over the greatest magnitude; below it lies the rounding of single-precision floats."""
+"""Smallest step relative to the greatest magnitude; single-precision floats round below it."""
 
 _FINEST_DOUBLE = 2.0**-44
-"""The same of values that single precision does not hold."""
+"""The same for values that are not single-precision numbers."""
 
 _CELLS = 1 << 15
-"""Cells of the histogram whose transform is searched; steps down to 4 / _CELLS of the range."""
+"""Cells of the histogram that is transformed; the finest step is 4 / _CELLS of the range."""
 
 _SOME = 256
-"""Distances, evenly spread over the range, that are asked for a common step before all are."""
+"""Distances, evenly spread over the range, that are tested for a common step before all are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantization:
-    """Rounding of a signal to a grid, offset + k step.
+    """Rounding of a signal to a grid, offset + k step."""
 
-    Parameters
-    ----------
-    step : float
-        Distance between neighbouring levels, in the signal's unit.
-    std : float
-        Standard deviation of `step`, in the signal's unit.
-    offset : float
-        One of the levels, between 0 and `step`.
-    exact : bool
-        Whether every value but the extremes lies on the grid; False if something was added after
-        rounding.
-    """
-
+    # distance between neighbouring levels, and its standard deviation, in the signal's unit
     step: float
     std: float
-    offset: float
-    exact: bool
+    offset: float  # one of the levels, between 0 and `step`
+    exact: bool  # every value but the extremes lies on the grid; False if something was added later
 
     @property
     def noise_std(self) -> float:
-        """Standard deviation of the error of rounding, step / √12, in the signal's unit."""
+        """Standard deviation of the rounding error, step / √12, in the signal's unit."""
         return float(self.step / np.sqrt(12.0))
 
 
@@ -68,8 +56,7 @@ def detect_quantization(y: Real) -> Quantization | None:
 
     Give the values as recorded: resampling blurs the grid. None for continuous data, for data
     rounded to significant digits rather than to a step, for fewer than five levels, and for a step
-    below 2^-22 of the greatest value where all values are single-precision numbers, 2^-44 where
-    they are not.
+    below 2^-22 of the greatest value if all values are single-precision numbers, or else 2^-44.
 
     Examples
     --------
@@ -84,20 +71,21 @@ def detect_quantization(y: Real) -> Quantization | None:
     largest, span = float(np.max(np.abs(y))), float(np.ptp(y))
     if span == 0.0:
         return None
-    levels = _distinct(y, 64 * np.finfo(float).eps * largest)
+    values = np.sort(y)  # values that differ by arithmetic alone count once
+    distinct = np.diff(values) > 64 * np.finfo(float).eps * largest
+    levels = values[np.concatenate([[True], distinct])]
     if levels.size < _FEWEST_LEVELS:
         return None
-    inner = levels[1:-1]  # a level at which the output is clipped is on no grid
-    told = inner if inner.size >= _FEWEST_LEVELS else levels
-    return _by_distances(told, largest) or _by_clusters(y, span)
+    inner = levels[1:-1]  # a clipping level is on no grid
+    tested = inner if inner.size >= _FEWEST_LEVELS else levels
+    return _by_distances(tested, largest) or _by_clusters(y, span)
 
 
 def is_predicted(found: Quantization, y: Real, prediction: Real) -> bool:
     """Whether a prediction and normal noise bring values as near to the grid, without rounding.
 
-    An input of few levels does, through a unit that follows it at once. The characteristic
-    function of a sum is the product of those of its parts. Values that all lie on the grid are
-    rounded, whatever the prediction.
+    They do if an input of few levels drives a unit without dynamics. The characteristic function
+    of a sum is the product of those of its parts. Values exactly on the grid are always rounded.
 
     Examples
     --------
@@ -116,26 +104,19 @@ def is_predicted(found: Quantization, y: Real, prediction: Real) -> bool:
         return False
     omega = 2.0 * np.pi / found.step
     smeared = float(np.exp(-0.5 * omega**2 * np.mean((y - prediction) ** 2)))
-    seen, expected = (abs(np.mean(np.exp(1j * omega * x))) for x in (y, prediction))
-    beyond = max(float(seen - expected * smeared), 0.0)
+    actual, expected = (abs(np.mean(np.exp(1j * omega * x))) for x in (y, prediction))
+    beyond = max(float(actual - expected * smeared), 0.0)
     return y.size * beyond**2 <= SEARCHED * (1.0 - smeared**2)
-
-
-def _distinct(samples: Real, tolerance: float) -> Real:
-    """Sorted values; those that differ by arithmetic alone count once."""
-    values = np.sort(samples)
-    starts = np.concatenate([[True], np.diff(values) > tolerance])
-    return np.asarray(values[starts])
 
 
 def _by_distances(levels: Real, largest: float) -> Quantization | None:
     """Find the step of which all distances between neighbours are multiples."""
     gaps = np.diff(levels)
     smallest = float(gaps.min())
-    # Where a grid's distances are all multiples of a step, so are some of them.
+    # If all distances of a grid are multiples of a step, so are some of them.
     some = np.sort(gaps[:: max(1, gaps.size // _SOME)])
     finest = (_FINEST if _single(levels) else _FINEST_DOUBLE) * largest
-    for divisor in (1, 2, 3):  # the smallest distance seen may be a few steps
+    for divisor in (1, 2, 3):  # the smallest distance may be a few steps
         rough = smallest / divisor
         if rough < finest:
             return None
@@ -155,7 +136,7 @@ def _single(levels: Real) -> bool:
 
 
 def _common_step(ordered: Real, step: float, most: float) -> float | None:
-    """Step of which rising distances are multiples, to an r.m.s. share of it; None if of none."""
+    """Refine a step of which distances are multiples; None if their r.m.s. error is > `most`."""
     # Small distances first: their multiple is sure even while the step is rough.
     count = 1
     while True:
@@ -171,20 +152,19 @@ def _common_step(ordered: Real, step: float, most: float) -> float | None:
 
 
 def _multiples(levels: Real, gaps: Real, step: float) -> Quantization | None:
-    """The grid of such a step through all levels."""
+    """Fit a grid of that step through all levels; None if they do not lie on one."""
     k = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / step), 1.0))])
     centred = k - k.mean()
     spread = float(centred @ centred)
     step = float(centred @ levels / spread)
     offset = float(np.mean(levels - step * k))
-    left = levels - offset - step * k
-    error = float(np.sqrt(np.mean(left**2)))
+    error = float(np.sqrt(np.mean((levels - offset - step * k) ** 2)))
     if error > FEW * step or _significant_digits(levels, step):
         return None
     rounding = np.finfo(float).eps * float(np.max(np.abs(levels)))
     return Quantization(
         step=step,
-        # No step is known better than a float holds it.
+        # The precision of a float limits that of the step.
         std=float(max(max(error, rounding) / np.sqrt(spread), np.finfo(float).eps * step)),
         offset=float(offset % step),
         exact=True,
@@ -205,12 +185,12 @@ def _by_clusters(samples: Real, span: float) -> Quantization | None:
     low = float(samples.min())
     width = span * (1.0 + 1e-9) / _CELLS
     counts = np.bincount(((samples - low) / width).astype(np.intp), minlength=_CELLS)
-    # A plateau counts as much as its neighbours: it must not ring at all frequencies.
+    # Clip the count of a plateau, or it would dominate at all frequencies.
     counts = np.minimum(counts, max(3, int(3 * samples.size / _CELLS)))
     total = float(counts.sum())
     cells = counts.astype(np.float32)
     first, last = 4 * (_FEWEST_LEVELS + 1), _CELLS
-    # Of two points per peak the nearest stands at half its height at least.
+    # With two points per peak, the nearest is at half its height at least.
     least = PART**2 * total**2
     if float(_power(cells, 2)[first // 2 : last // 2].max()) < (1 - PART) * MOST * least:
         return None
@@ -223,13 +203,13 @@ def _by_clusters(samples: Real, span: float) -> Quantization | None:
 
 
 def _power(cells: NDArray[np.float32], points: int) -> Real:
-    """Power of the cells' transform, so many points per peak."""
+    """Power of the cells' transform, with so many points per peak."""
     spectrum = scipy.fft.rfft(cells, points * cells.size)
     return np.asarray(spectrum.real**2 + spectrum.imag**2, dtype=np.float64)
 
 
 def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:
-    """Fit the grid to all values by least squares of their distance from it."""
+    """Fit the grid to all values by least squares of their distances from it."""
     middle = float(np.median(samples))
     for _ in range(8):
         phase = np.angle(np.mean(np.exp(2j * np.pi * (samples - middle) / step)))
@@ -243,9 +223,8 @@ def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:
         if abs(moved - step) * span / step < 1e-9 * step:
             break
         step = moved
-    left = samples - origin - step * k
-    error = float(np.std(left))
-    if error > NEARLY * step / np.sqrt(12):  # no nearer to the grid than any values are
+    error = float(np.std(samples - origin - step * k))
+    if error > NEARLY * step / np.sqrt(12):  # no nearer to the grid than arbitrary values
         return None
     return Quantization(
         step=step, std=float(error / np.sqrt(spread)), offset=float(origin % step), exact=False

@@ -1,4 +1,4 @@
-"""What is said of clipped, held, rounded and lost samples, and the figures read off them."""
+"""Findings and parameters from clipped, held, rounded and lost samples."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,7 +20,7 @@ __all__ = ["with_imperfections"]
 def with_imperfections(
     parameters: Parameters, found: Imperfections, censored: CensoredFit | None, unit: str
 ) -> tuple[Parameters, tuple[Finding, ...]]:
-    """Add levels, hold period and step to the parameters, and say what they are."""
+    """Add levels, hold period and step to the parameters, and report the findings."""
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
     figures = {}
     if clipping is not None:
@@ -46,7 +46,7 @@ def with_imperfections(
 
 
 def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Iterator[Finding]:
-    """Clipped, held and rounded: share, levels, period and step."""
+    """Clipping, hold and rounding: share, levels, period and step."""
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
     if clipping is not None:
         much = clipping.share > NEARLY * MOST  # a rectifier clips half
@@ -96,7 +96,7 @@ def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Itera
 
 
 def _of_lost(found: Imperfections) -> Iterator[Finding]:
-    """Samples that are left out."""
+    """Samples that are excluded: repeated frames, spikes and standstills."""
     if found.repeated is not None:
         count, share = int(np.count_nonzero(found.repeated)), float(np.mean(found.repeated))
         yield Finding(

@@ -1,10 +1,10 @@
-"""Levels at which a signal was clipped, and which samples were.
+"""Levels at which a signal was clipped, and the samples at them.
 
 A clipped signal spends far more time at its extreme than just below it, and reaches it at
 speed. A sinusoid's crest, a settled step or a square wave does not: at a crest the density
 of the values rises as one over the root of the distance, at a settling step as one over the
-distance, and a square wave has no values below its extreme at all. Where a prediction is at
-hand the question is simpler: does it go on beyond the level?
+distance, and a square wave has no values below its extreme at all. With a prediction, the
+question is simpler: does the prediction exceed the level?
 """
 
 from dataclasses import dataclass, replace
@@ -20,53 +20,40 @@ from hmpim.identify.effects.smeared import Side, smeared_plateaus
 from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TOLERATED, TWICE
 
-__all__ = ["NoiseAt", "Saturation", "detect_saturation", "goes_beyond"]
+__all__ = ["Saturation", "detect_saturation", "goes_beyond"]
 
-NoiseAt = Literal["before", "after"]
-"""Whether the noise is clipped with the signal, or added to what was clipped."""
 
 _CROWDED = 3.5
 """Samples at a flattened crest, as of sin x + (1/9) sin 3x, over those expected from just below;
 a sinusoid's gives 2.4 to 3."""
 
 _FEWEST = 8
-"""Samples that must be at the level, and just below it, before anything is said."""
+"""Fewest samples at the level, and just below it."""
 
 _FINE = 64
-"""Cells to a deviation of the noise in which values are counted: the place of their crowd moves by
-no more than 1e-5 of it."""
+"""Cells of the histogram per standard deviation of the noise; they move the densest place by no
+more than 1e-5 of it."""
 
 _VISITS = 2
-"""Stays at the level that must look alike, where no prediction helps."""
+"""Fewest stays at the level that must look alike, without a prediction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Saturation:
-    """Clipping of a signal, with the standard deviation of each level.
+    """Clipping of a signal, with the standard deviation of each level."""
 
-    Parameters
-    ----------
-    low, high : float or None
-        Levels in the signal's unit; None where the range was not reached.
-    low_std, high_std : float or None
-        Their standard deviations.
-    clipped_low, clipped_high : ndarray of bool, shape (n,)
-        Samples at the level. With noise added after the clipping these are the samples
-        within 3.9 of its standard deviations, or whose prediction lies beyond the level.
-    noise : {'before', 'after'}
-        Whether the clipped values are all alike (noise comes before) or scatter (after).
-    tolerance : float
-        Half the step of rounding: a value may lie so far inside the level and read as it.
-    """
-
+    # levels and their standard deviations, in the signal's unit; None where nothing is clipped
     low: float | None
     high: float | None
     low_std: float | None
     high_std: float | None
+    # (n,): samples at the level; if noise was added after clipping, those within 3.9 of its
+    # standard deviations, or whose prediction lies beyond the level
     clipped_low: Mask
     clipped_high: Mask
-    noise: NoiseAt
-    tolerance: float
+    # Noise before the clipping leaves equal values at a level; noise after it scatters them.
+    noise: Literal["before", "after"]
+    tolerance: float  # half the rounding step: a value so far inside the level may read as it
 
     @property
     def clipped(self) -> Mask:
@@ -82,23 +69,12 @@ class Saturation:
 def detect_saturation(
     y: ArrayLike, prediction: ArrayLike | None = None, *, step: float = 0.0
 ) -> Saturation:
-    """Find the levels at which `y` was clipped.
+    """Find the levels at which `y`, (n,), was clipped; None where there is no clipping.
 
-    Parameters
-    ----------
-    y : array_like, shape (n,)
-        Output samples.
-    prediction : array_like, shape (n,), optional
-        What a linear model says the output would be. It need not be good: its gain and timing
-        are corrected on the samples that are not at the level. With it a short plateau is
-        told from a crest, and a square wave from a clipped one.
-    step : float
-        Step to which `y` is rounded, in its unit; 0 for none (see `detect_quantization`).
-
-    Returns
-    -------
-    Saturation
-        Levels are None where there is no clipping.
+    The prediction is that of a linear model, (n,). It need not be good: its gain and timing are
+    corrected on the samples that are not at the level. It distinguishes a short plateau from a
+    crest, and a clipped wave from a square one. `step` is that to which `y` is rounded, in its
+    unit; 0 for none (see `detect_quantization`).
 
     Raises
     ------
@@ -123,7 +99,7 @@ def detect_saturation(
     low = _upper(-samples, None if model is None else -model, step, scatter)
     if low is not None:
         low = replace(low, level=-low.level)
-    if high is None and low is None and model is not None:  # only the prediction may show it
+    if high is None and low is None and model is not None:  # noise may hide the plateau
         low, high = smeared_plateaus(samples, model, step=step)
     nothing = np.zeros(samples.size, dtype=bool)
     exact = all(side.exact for side in (low, high) if side is not None)
@@ -140,7 +116,7 @@ def detect_saturation(
 
 
 def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> Side | None:
-    """The upper level, by exact ties; without a prediction, by a plateau with scatter too."""
+    """The upper level: of equal values or, without a prediction, of scattered ones too."""
     span = float(np.ptp(y))
     if span == 0.0:
         return None
@@ -155,22 +131,19 @@ def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> Side 
 
 
 def _spread(x: Real) -> float:
-    """Standard deviation of the bulk, from the median of the magnitude."""
+    """Standard deviation of the bulk, from the median magnitude."""
     return median(np.abs(x - median(x))) / BULK
 
 
 def _scatter(y: Real) -> float:
-    """Standard deviation of what is not smooth from sample to sample: third differences.
-
-    Of many, those that begin at evenly spread samples.
-    """
+    """Standard deviation of the noise, from third differences of (at most some) samples."""
     every = every_of(y.size)
     first, second, third, last = (y[k : y.size - 3 + k : every] for k in range(4))
     return _spread(last - first + 3.0 * (second - third)) / float(np.sqrt(20.0))
 
 
 def _exact(y: Real, span: float, step: float) -> Side | None:
-    """Samples that share the greatest value, if it is not just any value that recurs."""
+    """The greatest value, if enough samples share it."""
     rounding = max(1e-11 * span, 8 * np.finfo(float).eps * float(np.max(np.abs(y))))
     tolerance = max(rounding, 0.5 * step)
     top = float(y.max())
@@ -182,9 +155,9 @@ def _exact(y: Real, span: float, step: float) -> Side | None:
 
 
 def _scattered(y: Real, sigma: float) -> Side | None:
-    """A crowd of samples within a few `sigma` of the top."""
+    """A cluster of samples within a few `sigma` of the top."""
     top = float(y.max())
-    most = deviations(y.size) * sigma  # a level further below the top is none
+    most = deviations(y.size) * sigma  # a level cannot be further below the top
     upper = y[y > top - 2.0 * most]
     cell = ((top - upper) * (_FINE / sigma)).astype(np.intp)
     held = np.bincount(cell)
@@ -192,12 +165,10 @@ def _scattered(y: Real, sigma: float) -> Side | None:
     held = held[filled]
     place = np.bincount(cell, weights=upper)[filled] / held
     level = top - DEVIATIONS * sigma
-    for _ in range(50):  # climbs to where the values are densest
+    for _ in range(50):  # moves to where the values are densest
         weight = held * np.exp(-0.5 * ((place - level) / sigma) ** 2)
-        moved = float(weight @ place / weight.sum())
-        done = abs(moved - level) < 1e-6 * sigma
-        level = moved
-        if done:
+        before, level = level, float(weight @ place / weight.sum())
+        if abs(level - before) < 1e-6 * sigma:
             break
     near = np.abs(y - level) < DEVIATIONS * sigma
     count = int(np.count_nonzero(near))
@@ -215,9 +186,10 @@ def _scattered(y: Real, sigma: float) -> Side | None:
 def _is_clipped(
     y: Real, side: Side, prediction: Real | None, step: float, span: float, scatter: float
 ) -> bool:
+    """Whether a level is one of clipping, by the values near it or by the prediction."""
     resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     if side.exact:
-        resolution *= 2.0  # the level stands for half a step on either side
+        resolution *= 2.0  # the level covers half a step on either side
     distance = side.level - y[~side.at]
     reach = resolution + MUCH * span
     below = distance[(distance >= 0) & (distance < reach)]
@@ -226,13 +198,12 @@ def _is_clipped(
         return False
     if prediction is not None:
         return _is_confirmed(y, side, prediction, resolution, scatter)
-    if below.size < _FEWEST or not _is_even(below, resolution, reach):
-        return False
-    return _is_flat(y, side, resolution, reach)
+    even = below.size >= _FEWEST and _is_even(below, resolution, reach)
+    return even and _is_flat(y, side, resolution, reach)
 
 
 def _is_crowded(count: int, below: Real, resolution: float) -> bool:
-    """Whether the level holds more samples than a crest would, judged by what is just below."""
+    """Whether the level has more samples than a crest would, given those just below it."""
     if below.size == 0:
         return True
     nearest = min(max(40, count // 4), count, below.size)
@@ -243,7 +214,7 @@ def _is_crowded(count: int, below: Real, resolution: float) -> bool:
 
 
 def _is_even(below: Real, resolution: float, reach: float) -> bool:
-    """Whether the values below the level do not crowd towards it."""
+    """Whether the density of the values below the level does not rise towards it."""
     floor = max(resolution, reach / 100.0)
     inside = np.maximum(below, floor) - floor + reach / 100.0
     exponent = 1.0 - inside.size / float(np.sum(np.log((reach - floor) * 1.01 / inside)))
@@ -252,7 +223,7 @@ def _is_even(below: Real, resolution: float, reach: float) -> bool:
 
 
 def _visits(at: Mask) -> NDArray[np.intp]:
-    """First and last sample of each stay at the level, shape (m, 2); short breaks do not count."""
+    """First and last sample of each stay at the level, shape (m, 2); ignores short breaks."""
     where = np.flatnonzero(at)
     breaks = np.flatnonzero(np.diff(where) > 3)
     first = where[np.concatenate([[0], breaks + 1])]
@@ -262,7 +233,7 @@ def _visits(at: Mask) -> NDArray[np.intp]:
 
 
 def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
-    """Whether the level is met and left at speed, the same either way, and is flat between."""
+    """Whether the level is reached and left at speed, alike on both sides, and is flat between."""
     visits = _visits(side.at)
     if visits.shape[0] < _VISITS:
         return False
@@ -275,7 +246,7 @@ def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
         after = near[last + 1 : last + 1 + length]
         coming.append(before.size if before.all() else int(np.argmin(before)))
         leaving.append(after.size if after.all() else int(np.argmin(after)))
-    if min(np.median(coming), np.median(leaving)) < 2.0:  # by a jump: a square wave
+    if min(np.median(coming), np.median(leaving)) < 2.0:  # a jump, as of a square wave
         return False
     if not 1.0 / TWICE < sum(coming) / sum(leaving) < TWICE:
         return False
@@ -283,7 +254,7 @@ def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
 
 
 def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) -> bool:
-    """Whether the values within the visits have no common slope or curvature."""
+    """Whether the values within the stays have no common slope or curvature."""
     place = np.concatenate([np.linspace(-1, 1, last - first + 1) for first, last in visits])
     value = np.concatenate([y[first : last + 1] for first, last in visits])
     rows = np.stack([np.ones(place.size), place, place**2])
@@ -292,14 +263,7 @@ def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) ->
 
 
 def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
-    """Whether a prediction exceeds a level of clipping that was found without it.
-
-    Parameters
-    ----------
-    found : Saturation
-        Clipping of `y`.
-    y, prediction : ndarray, shape (n,)
-        Output, and what a model of its other samples says it would be.
+    """Whether a prediction, (n,), exceeds a clipping level of `y` that was found without it.
 
     Examples
     --------
@@ -313,8 +277,8 @@ def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
     for level, at, sign in sides:
         if level is None:
             continue
-        told = _beyond(sign * y, sign * level, at, sign * prediction, 0.0)
-        if told is not None and _is_passed(*told, at, ROUNDING * float(np.ptp(y))):
+        ahead = _beyond(sign * y, sign * level, at, sign * prediction, 0.0)
+        if ahead is not None and _is_passed(*ahead, at, ROUNDING * float(np.ptp(y))):
             return True
     return False
 
@@ -322,7 +286,10 @@ def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
 def _beyond(
     y: Real, level: float, at: Mask, prediction: Real, resolution: float
 ) -> tuple[Real, float] | None:
-    """How far the prediction, set right on the other samples, lies beyond the level; its error."""
+    """Distance of the corrected prediction beyond the level, and its error.
+
+    Its gain, bias and timing are corrected on the samples that are not at the level.
+    """
     slope = np.gradient(prediction)
     rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
     free = ~at
@@ -344,14 +311,14 @@ def _is_passed(beyond: Real, error: float, at: Mask, resolution: float) -> bool:
 
 
 def _is_confirmed(y: Real, side: Side, prediction: Real, resolution: float, scatter: float) -> bool:
-    """Whether the prediction exceeds the level at the level, or moves where no value does."""
-    told = _beyond(y, side.level, side.at, prediction, resolution)
-    if told is None:
+    """Whether the prediction exceeds the level, or moves while the values stand still."""
+    ahead = _beyond(y, side.level, side.at, prediction, resolution)
+    if ahead is None:
         return False
-    beyond, error = told
+    beyond, error = ahead
     if _is_passed(beyond, error, side.at, resolution):
         return True
-    # Values that scatter elsewhere and are all alike here, while the prediction moves.
+    # Values that scatter elsewhere are all alike here, while the prediction moves.
     noise = min(error, scatter)
-    moves = float(np.std(beyond))
-    return bool(noise > resolution and moves > max(MUCH * noise, MATERIAL * float(np.ptp(y))))
+    least = max(MUCH * noise, MATERIAL * float(np.ptp(y)))
+    return bool(noise > resolution and np.std(beyond) > least)

@@ -1,9 +1,8 @@
-"""Clipping under noise that was added after it, judged by a prediction.
+"""Clipping followed by noise, detected with the help of a prediction.
 
-No value repeats then, and the plateau is as wide as the noise. What can be compared is the
-output with the prediction, clipped and not: min(H, max(L, q)), q a correction of the
-prediction, against q itself and against a bent q, as a soft spring gives. Which samples are
-clipped and what q is are found in turn.
+No value repeats then, and the plateau is as wide as the noise. The output is compared with a
+corrected prediction q, clipped and not: min(H, max(L, q)) against q itself, and against a bent q,
+as a soft spring gives. The clipped samples and q are found in turn.
 """
 
 from dataclasses import dataclass
@@ -19,18 +18,18 @@ from hmpim.identify.worth import FEW, MUCH, WORTH
 __all__ = ["Side", "smeared_plateaus"]
 
 _FEWEST = 12
-"""Samples at a level."""
+"""Fewest samples at a level."""
 
 _MOST = 20_000
-"""Samples looked at."""
+"""Most samples used."""
 
 _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
-"""Where a level is first looked for: quantiles of the prediction."""
+"""Initial levels: quantiles of the prediction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Side:
-    """One level, its standard deviation, the samples at it, and whether their values tie."""
+    """A level, its standard deviation, the samples at it, and whether they are equal."""
 
     level: float
     std: float
@@ -40,6 +39,8 @@ class Side:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Split:
+    """A clipped fit: its sum of squares, levels, clipped samples and corrected prediction."""
+
     cost: float
     low: float
     high: float
@@ -52,10 +53,11 @@ class _Split:
 def smeared_plateaus(
     y: Real, prediction: Real, *, step: float = 0.0
 ) -> tuple[Side | None, Side | None]:
-    """Find levels at which an output was clipped before noise was added, by a linear model's.
+    """Find levels at which an output was clipped before noise was added.
 
-    `step` is that to which it is rounded, in its unit; 0 for none. None for a side, low or high,
-    that is not clipped. Samples whose prediction lies beyond a level are at it.
+    The prediction is that of a linear model; samples where it is beyond a level are at that level.
+    `step` is that to which the output is rounded, in its unit; 0 for none. The values are the low
+    and the high side, None where it is not clipped.
 
     Examples
     --------
@@ -69,13 +71,13 @@ def smeared_plateaus(
     """
     slope = np.gradient(prediction)
     everything = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
-    every = 1 + y.size // _MOST  # a long record tells as well by some of its samples
+    every = 1 + y.size // _MOST  # some samples of a long record are enough
     rows, prediction, y = everything[:, ::every], prediction[::every], y[::every]
     sides = _falls_short(y, rows)
     best = _best_split(y, rows, sides) if any(sides) else None
     if best is None:
         return None, None
-    # Slow noise bends the output as well: fewer of its samples are independent.
+    # Slow noise also bends the output: fewer of its samples are independent.
     model = np.clip(best.unclipped, best.low, best.high)
     variance = best.cost / y.size / effective_share(y - model)
     bent = np.vstack([rows, prediction**2, prediction**3])
@@ -112,26 +114,24 @@ def _cost(y: Real, rows: Real) -> float:
 
 
 def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
-    """Whether the output bends away from the prediction at its low and at its high end."""
+    """Whether the output falls short of the prediction at its low and at its high end."""
     p = rows[1]
-    ends = np.quantile(p, [0.1, 0.9])
-    hinges = np.stack([np.minimum(p - ends[0], 0.0), np.maximum(p - ends[1], 0.0)])
+    low, high = np.quantile(p, [0.1, 0.9])
     found = []
-    for i in range(2):
-        full = np.vstack([rows, hinges[i]])
-        q, r = np.linalg.qr(full.T)
+    for hinge in (np.minimum(p - low, 0.0), np.maximum(p - high, 0.0)):
+        q, r = np.linalg.qr(np.vstack([rows, hinge]).T)
         if abs(r[-1, -1]) <= 1e-9 * float(np.linalg.norm(p)):
             found.append(False)
             continue
         weight = float(q[:, -1] @ y) / r[-1, -1]
-        left = y - q @ (q.T @ y)
-        error = float(np.sqrt(left @ left / y.size)) / abs(r[-1, -1])
+        residual = y - q @ (q.T @ y)
+        error = float(np.sqrt(residual @ residual / y.size)) / abs(r[-1, -1])
         found.append(weight < -max(deviations(2) * error, FEW))
     return found[0], found[1]
 
 
 def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split | None:
-    """The best of what is found from all starts; None where none is."""
+    """The best clipped fit from all starts; None if there is none."""
     found = []
     for quantile in _STARTS:
         low, high = np.quantile(rows[1], [1.0 - quantile, quantile])
@@ -140,24 +140,23 @@ def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split | None:
 
 
 def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
-    """Levels and correction in turn, until the clipped samples stay the same."""
+    """Fit levels and correction in turn, until the clipped samples stay the same."""
     q, weights = rows[1], np.zeros(rows.shape[0])
     below, above = q < low, q > high
     for _ in range(30):
         free = ~(below | above)
         if np.count_nonzero(free) < max(4 * rows.shape[0], FEW * y.size):
             return None
-        told = rows[:, free]
-        weights = solved(told @ told.T, told @ y[free])
+        used = rows[:, free]
+        weights = solved(used @ used.T, used @ y[free])
         q = weights @ rows
         if below.any():
             low = float(np.mean(y[below]))
         if above.any():
             high = float(np.mean(y[above]))
-        moved = (q < low) & np.isfinite(low), (q > high) & np.isfinite(high)
-        done = np.array_equal(moved[0], below) and np.array_equal(moved[1], above)
-        below, above = moved
-        if done:
+        before = below, above
+        below, above = (q < low) & np.isfinite(low), (q > high) & np.isfinite(high)
+        if np.array_equal(before, (below, above)):
             break
     cost = float(np.sum((y - np.clip(q, low, high)) ** 2))
     return _Split(
@@ -168,7 +167,7 @@ def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
 def _holds(
     y: Real, rows: Real, best: _Split, clipped: Mask, others: tuple[bool, bool], variance: float
 ) -> bool:
-    """Whether one side's plateau is needed, and flat."""
+    """Whether one side's plateau is necessary, and flat."""
     if np.count_nonzero(clipped) < _FEWEST:
         return False
     q = best.unclipped[clipped]

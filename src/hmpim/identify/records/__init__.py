@@ -1,6 +1,7 @@
 """Several records of one unit.
 
-alike    whether they are of one test
-repeats  one test repeated: averages, and whether they scatter as stated
-levels   one stimulus at several amplitudes
+alike     whether they are of one test
+repeats   one test repeated: averages, and whether they scatter as stated
+repeated  its result
+levels    one stimulus at several amplitudes
 """

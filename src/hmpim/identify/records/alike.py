@@ -11,7 +11,7 @@ from hmpim.record import Record, uniform
 __all__ = ["check_alike", "check_apart", "check_channels", "same_at_levels"]
 
 _SAME_RATE = 1e-3
-"""Share by which the rates of two clocks may differ and still be one rate."""
+"""Relative difference up to which the rates of two clocks are the same."""
 
 
 def same_at_levels(records: Sequence[Record]) -> bool:
@@ -52,7 +52,7 @@ def same_at_levels(records: Sequence[Record]) -> bool:
 
 
 def check_channels(records: Sequence[Record]) -> None:
-    """Refuse records of which one has other channels than the first, or states other units."""
+    """Refuse records whose channels or units differ from the first one's."""
     first, *others = [(*r.inputs, *r.outputs) for r in records]
     for k, own in enumerate(others, start=1):
         names, known = [c.name for c in own], [c.name for c in first]
@@ -92,13 +92,13 @@ def check_alike(records: tuple[Record, ...]) -> None:
 
 
 def check_apart(records: tuple[Record, ...]) -> None:
-    """One record given twice tells nothing of repeatability; its noise would be the same noise."""
-    seen: dict[bytes, int] = {}
+    """Refuse one record given twice: it shows nothing of repeatability."""
+    known: dict[bytes, int] = {}
     for k, record in enumerate(records):
         measured = b"".join(channel.values.tobytes() for channel in record.outputs)
-        if measured in seen:
+        if measured in known:
             raise RecordError(
-                f"records {seen[measured]} and {k} hold the same samples; one record given twice "
+                f"records {known[measured]} and {k} hold the same samples; one record given twice "
                 "is not two repeats, so repeat the test"
             )
-        seen[measured] = k
+        known[measured] = k

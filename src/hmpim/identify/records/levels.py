@@ -1,8 +1,8 @@
 """The same test at several amplitudes: where the system is linear (Fig. 22).
 
-A linear system gives the same parameters whatever the amplitude. Each parameter is compared
-between the levels by the error bars it came with; those that move beyond them, and which way
-they move, tell where the linear range ends and what ends it.
+A linear system has the same parameters at every amplitude. Each parameter is compared between the
+levels by its error bars; those that change by more, and the direction of the change, show where the
+linear range ends and why.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,13 +25,7 @@ from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
 from hmpim.tables import html_table, shortened
 
-__all__ = [
-    "LevelComparison",
-    "Levels",
-    "Trend",
-    "compare_levels",
-    "identify_levels",
-]
+__all__ = ["LevelComparison", "Levels", "Trend", "compare_levels", "identify_levels"]
 
 _COMPARED = (
     "natural_frequency",
@@ -43,7 +37,7 @@ _COMPARED = (
     "scale_factor",
     "delay",
 )
-"""Parameters that a linear system keeps, the most telling first."""
+"""Parameters that are constant in a linear system, the most informative first."""
 
 _Level = tuple[float, Parameters]
 
@@ -57,9 +51,9 @@ class Trend:
     name : str
         Of the parameter.
     amplitudes, values, stds : tuple of float
-        By rising amplitude; levels at which it is not known are left out.
+        By rising amplitude; levels where it is not known are left out.
     probability : float
-        Chance of such differences were it the same at all levels.
+        Probability of such differences if it were the same at all levels.
     change : float
         From the smallest to the largest amplitude, relative to the value at the smallest.
     """
@@ -74,7 +68,7 @@ class Trend:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelComparison:
-    """All trends, the linear range, and sentences.
+    """All trends, the linear range, and findings.
 
     Parameters
     ----------
@@ -83,12 +77,12 @@ class LevelComparison:
     trends : tuple of Trend
         One per parameter known at two levels or more.
     linear_up_to : float
-        Greatest amplitude up to which no parameter leaves its value at the smallest one by
+        Largest amplitude up to which no parameter differs from its value at the smallest one by
         more than 1 % and by more than its error.
     findings : tuple of Finding
-        Codes 'nonlinear', 'hardening', 'softening', 'friction'; empty where nothing changes.
+        Codes 'nonlinear', 'hardening', 'softening', 'friction'; empty if nothing changes.
     unit : str
-        Of the amplitudes; empty where it is not known.
+        Of the amplitudes; empty if it is not known.
     """
 
     amplitudes: tuple[float, ...]
@@ -101,7 +95,7 @@ class LevelComparison:
         return f"LevelComparison({self._linear})"
 
     def _repr_html_(self) -> str:
-        """Return a table of the trends, as a notebook shows it."""
+        """Return a table of the trends, for notebooks."""
         levels = sorted(self.amplitudes)
         rows = []
         for trend in self.trends:
@@ -119,8 +113,8 @@ class LevelComparison:
     @property
     def _linear(self) -> str:
         least, most = min(self.amplitudes), max(self.amplitudes)
-        said = f"{len(self.amplitudes)} levels, {least:.4g} to {most:.4g} {self.unit}".rstrip()
-        return f"{said}; linear up to {self.linear_up_to:.4g} {self.unit}".rstrip()
+        levels = f"{len(self.amplitudes)} levels, {least:.4g} to {most:.4g} {self.unit}".rstrip()
+        return f"{levels}; linear up to {self.linear_up_to:.4g} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -146,7 +140,7 @@ class Levels:
         return f"Levels({shortened([one._linear for one in self.comparisons])})"
 
     def _repr_html_(self) -> str:
-        """Return a table for each pair, as a notebook shows it."""
+        """Return a table for each pair, for notebooks."""
         return "\n".join(one._repr_html_() for one in self.comparisons)
 
     def __iter__(self) -> Iterator[LevelComparison]:
@@ -164,18 +158,18 @@ def identify_levels(
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
 ) -> Levels:
-    """Identify one test at several amplitudes, and say where it stops being linear (Fig. 22).
+    """Identify one test at several amplitudes, and find where it stops being linear (Fig. 22).
 
     Parameters
     ----------
     records : sequence of Record
         Two or more, with the same channels.
     amplitudes : sequence of float, optional
-        One per record, by any measure that is the same for all; if None, half the range that
-        each pair's own input covers.
+        One per record, in any measure that is the same for all; if None, half the range of each
+        pair's own input.
     intersample, structures
-        As in `identify`. Each pair takes the structure found at the smallest amplitude for
-        all, so that like is compared with like.
+        As in `identify`. Each pair takes the structure found at the smallest amplitude at all
+        levels, so that they can be compared.
 
     Returns
     -------
@@ -218,15 +212,14 @@ def identify_levels(
         heights = [float(np.ptp(r.channel(pair.input).values)) / 2 for r in given]
         heights = heights if amplitudes is None else list(amplitudes)
         first = results[int(np.argmin(heights))][key]
-        alike = [
-            found
-            if (found := result[key]).structure == first.structure
-            or found.verdict == "not_identifiable"
-            else linear(record, intersample=first.intersample, structures=_only(first.structure))[
-                key
-            ]
-            for record, result in zip(given, results, strict=True)
-        ]
+        alike = []
+        for record, result in zip(given, results, strict=True):
+            found = result[key]
+            if found.structure != first.structure and found.verdict != "not_identifiable":
+                only = _only(first.structure)
+                again = linear(record, intersample=first.intersample, structures=only)
+                found = again[key]
+            alike.append(found)
         unit = given[0].channel(pair.input).unit if amplitudes is None else ""
         comparisons.append(compare_levels(alike, heights, unit=unit))
     return Levels(results=tuple(results), comparisons=tuple(comparisons))
@@ -290,7 +283,7 @@ def compare_levels(
 
 
 def _changes(changed: list[Trend], where: str, unit: str) -> Iterator[Finding]:
-    """Say which parameter changes most, and where a linear model serves."""
+    """Report which parameter changes most, and where a linear model is valid."""
     if not changed:
         return
     most = max(changed, key=lambda t: abs(t.change))
@@ -307,7 +300,7 @@ def _changes(changed: list[Trend], where: str, unit: str) -> Iterator[Finding]:
 def _levels(
     results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
 ) -> list[_Level]:
-    """Amplitudes, the smallest first, and what was identified there."""
+    """Amplitudes, the smallest first, and the parameters identified there."""
     if len(results) != len(amplitudes):
         raise ArgumentError(
             f"{len(results)} results and {len(amplitudes)} amplitudes do not go together; "
@@ -324,7 +317,7 @@ def _levels(
 
 
 def _linear_range(levels: list[_Level], reach: float, unit: str) -> str:
-    """Up to where a linear model serves, as a sentence."""
+    """Say in a sentence up to where a linear model is valid."""
     if reach == levels[0][0]:
         return "Use a linear model at the smallest amplitude only."
     end = f"{reach:.4g} {unit}".rstrip()
@@ -334,7 +327,7 @@ def _linear_range(levels: list[_Level], reach: float, unit: str) -> str:
 
 
 def _trend(levels: list[_Level], name: str) -> Trend | None:
-    """Values of one parameter, and a χ² test of their being equal."""
+    """Values of one parameter, and a χ² test of whether they are equal."""
     pairs = [(amplitude, getattr(parameters, name)) for amplitude, parameters in levels]
     known = [(a, e) for a, e in pairs if e is not None and 0 < e.spread < np.inf]
     if len(known) < 2:
@@ -355,7 +348,7 @@ def _trend(levels: list[_Level], name: str) -> Trend | None:
 
 
 def _linear_up_to(levels: list[_Level], trends: tuple[Trend, ...]) -> float:
-    """Last level before any parameter leaves its first value."""
+    """Last level before any parameter differs from its first value."""
     reach = levels[-1][0]
     for t in trends:
         for a, value, std in zip(t.amplitudes[1:], t.values[1:], t.stds[1:], strict=True):
@@ -368,7 +361,7 @@ def _linear_up_to(levels: list[_Level], trends: tuple[Trend, ...]) -> float:
 
 
 def _kind(changed: dict[str, Trend]) -> Iterator[Finding]:
-    """A spring moves the natural frequency; friction damps small motions the most."""
+    """Report friction, which damps small motions most, or a spring, which moves the frequency."""
     frequency, damping = changed.get("natural_frequency"), changed.get("damping_ratio")
     if (
         damping is not None

@@ -1,4 +1,4 @@
-"""What several records of one stimulus say together."""
+"""Result of several records of one stimulus."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
@@ -19,34 +19,34 @@ __all__ = ["RepeatedPair", "RepeatedParameter", "Repeats"]
 SCHEMA = "hmpim/repeats/1"
 
 _HEADS = ("parameter", "mean", "repeatability", "chance", "stated errors agree", "verdict")
-"""Column heads of a notebook's table."""
+"""Column heads of the table for notebooks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RepeatedParameter:
-    """One parameter over the repeats that could tell it.
+    """One parameter, averaged over the repeats that determine it.
 
     Parameters
     ----------
     name : str
         As in `Parameters`.
     mean : Estimate
-        Weighted by 1/std². Its std is that of the weights, or what the scatter says if that is
-        more (R. T. Birge, Phys. Rev. 40, 1932). Where the interval of every repeat reaches to
+        Weighted by 1/std². Its std follows from the weights, or from the scatter if that is
+        larger (R. T. Birge, Phys. Rev. 40, 1932). If the interval of every repeat includes
         another model, so does that of the mean, and its std is None.
     values : tuple of float
-        One for each repeat that has one.
+        One for each repeat that determines it.
     repeatability : float
         Standard deviation from repeat to repeat, same unit.
     chi_squared : float
-        Σ (value - mean)²/std², which has `freedom` degrees if the stated errors are right.
+        Σ (value - mean)²/std²; its expectation is `freedom` if the stated errors are right.
     freedom : int
         Number of values less one.
     probability : float
-        Chance of a larger `chi_squared` if the stated errors are right.
+        Probability of a larger `chi_squared` if the stated errors are right.
     agree : bool
         False if the scatter is larger, or smaller, than the stated errors would give once in
-        200 times. Of `delay_correlation`, a whole number of samples, only a larger one counts.
+        200 times. For `delay_correlation`, a whole number of samples, only a larger one counts.
     """
 
     name: str
@@ -66,31 +66,31 @@ class RepeatedParameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RepeatedPair:
-    """What the repeats say of one input and one output.
+    """Result of all repeats for one input and one output.
 
     Parameters
     ----------
     input, output : str
         Names.
     structures : tuple of str
-        What each repeat was found to be.
+        Structure found in each repeat.
     parameters : tuple of RepeatedParameter
-        Those that at least two repeats tell.
+        Those that at least two repeats determine.
     frequency_response : FrequencyResponse
-        Weighted by 1/std² at each frequency; its std is that of the weights, and knows nothing
-        of an error that all repeats have in common.
+        Weighted by 1/std² at each frequency; its std follows from the weights, without any
+        error that all repeats share.
     response_scatter : float
-        Scatter of the repeats' responses over their stated errors, root mean square over the
-        frequencies: near 1 if these are right.
+        R.m.s. scatter of the repeats' responses over their stated errors: near 1 if these are
+        right.
     noise_std : Estimate or None
-        What differs from repeat to repeat; None where no repeat could be identified.
+        Noise from the differences between repeats; None if fewer than two were identified.
     unmodelled : float or None
-        Root mean square of what each repeat leaves over alike, in the output's unit, the noise
-        that remains in the average taken off.
+        R.m.s. part of the residual that recurs in every repeat, in the output's unit, less the
+        noise that remains in the average.
     unmodelled_probability : float or None
-        Chance of seeing so much if there were noise only.
+        Probability of so much if there were noise only.
     findings : tuple of Finding
-        What the repeats disagree on.
+        Disagreements between the repeats.
     """
 
     input: str
@@ -117,7 +117,7 @@ class RepeatedPair:
         return f"RepeatedPair({self._named}: {what})"
 
     def _repr_html_(self) -> str:
-        """Return a table of the averages, as a notebook shows it."""
+        """Return a table of the averages, for notebooks."""
         notes = [finding.message for finding in self.findings]
         return html_table(f"{self._named}: averages", _HEADS, self._rows, notes=notes)
 
@@ -134,7 +134,7 @@ class RepeatedPair:
         ]  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values; what is no number is null."""
+        """Return plain JSON values; null for what is not finite."""
         scatter = self.response_scatter
         return {
             "input": self.input,
@@ -157,9 +157,9 @@ class Repeats:
     Parameters
     ----------
     results : tuple of Identification
-        Each record by itself.
+        Of each record alone.
     pairs : tuple of RepeatedPair
-        All of them together.
+        Of all records together.
     """
 
     results: tuple[Identification, ...]
@@ -173,11 +173,11 @@ class Repeats:
         return f"Repeats({len(self.results)} records: {shortened(names)})"
 
     def _repr_html_(self) -> str:
-        """Return a table of the averages of every pair, as a notebook shows it."""
+        """Return a table of the averages of every pair, for notebooks."""
         rows = [[pair._named, *row] for pair in self.pairs for row in pair._rows]
-        said = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
+        messages = dict.fromkeys(f.message for pair in self.pairs for f in pair.findings)
         title = f"{len(self.results)} records of one stimulus"
-        return html_table(title, ["from → to", *_HEADS], rows, notes=list(said))
+        return html_table(title, ["from → to", *_HEADS], rows, notes=list(messages))
 
     def __iter__(self) -> Iterator[RepeatedPair]:
         return iter(self.pairs)

@@ -1,8 +1,8 @@
 """Several records of one stimulus: averages, repeatability, and whether the error bars hold.
 
-What differs from repeat to repeat is noise; what the model leaves over each time alike is not
-noise but dynamics or nonlinearity that it does not describe (Pintelon and Schoukens, System
-Identification, 2nd ed., Wiley 2012, section 4.3: averages over periods tell the two apart).
+What differs between repeats is noise; the part of the residual that recurs in each is not noise but
+dynamics or nonlinearity that the model lacks (Pintelon and Schoukens, System Identification,
+2nd ed., Wiley 2012, section 4.3: averages over periods separate the two).
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,11 +20,7 @@ from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.records.alike import check_alike, check_apart
 from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
-from hmpim.identify.result import (
-    Estimate,
-    FrequencyResponse,
-    PairIdentification,
-)
+from hmpim.identify.result import Estimate, FrequencyResponse, PairIdentification
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT, in_words
 from hmpim.record import Finding, Intersample, Record
@@ -33,11 +29,9 @@ __all__ = ["identify_repeats"]
 
 
 _ROUNDING = 1e-12
-"""Reach over value that is arithmetic's and not the record's."""
+"""Relative size of a difference that is due to arithmetic alone."""
 
-
-# A whole number of samples, which may well be the same every time.
-_COUNTED = "delay_correlation"
+_COUNTED = "delay_correlation"  # a whole number of samples, which may be the same every time
 
 
 @checked
@@ -47,7 +41,7 @@ def identify_repeats(
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
 ) -> Repeats:
-    """Identify each record, average, and test the stated errors against the scatter seen.
+    """Identify each record, average, and test the stated errors against the scatter.
 
     Parameters
     ----------
@@ -102,19 +96,30 @@ def identify_repeats(
 
 
 def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
+    """Average one pair over all repeats."""
     parameters = tuple(one for name in EVERY if (one := _parameter(name, found)) is not None)
     response, scatter = _averaged(found)
-    told = tuple(pair for pair in found if pair.verdict != "not_identifiable")
-    noise, unmodelled, probability = _split(told)
-    recurs = unmodelled if probability is not None and probability < FALSE_ALARM else None
-    said = (*_unlike(found, told), *_doubts(parameters, found[0].output), *_recurring(recurs))
+    identified = tuple(pair for pair in found if pair.verdict != "not_identifiable")
+    noise, unmodelled, probability = _split(identified)
+    findings = [*_unlike(found, identified), *_doubts(parameters, found[0].output)]
+    if unmodelled and probability is not None and probability < FALSE_ALARM:
+        findings.append(
+            Finding(
+                code="unmodelled",
+                message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
+                "every repeat, so it is not noise. Look at the residual beside the stimulus.",
+                severity="doubt",
+                parameters=MODELLED,
+            )
+        )
     return RepeatedPair(
         input=found[0].input,
         output=found[0].output,
         structures=tuple(pair.structure for pair in found),
         parameters=tuple(
             replace(
-                p, mean=judged_together(p.mean, _told(p.name, found), name=p.name, findings=said)
+                p,
+                mean=judged_together(p.mean, _known(p.name, found), name=p.name, findings=findings),
             )
             for p in parameters
         ),
@@ -123,23 +128,23 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
         noise_std=noise,
         unmodelled=unmodelled,
         unmodelled_probability=probability,
-        findings=said,
+        findings=tuple(findings),
     )
 
 
 def _unlike(
-    found: tuple[PairIdentification, ...], told: tuple[PairIdentification, ...]
+    found: tuple[PairIdentification, ...], identified: tuple[PairIdentification, ...]
 ) -> Iterator[Finding]:
-    """Say that not all repeats could be identified, or not all as the same structure."""
-    if len(told) < len(found):
+    """Report that not all repeats could be identified, or not all as the same structure."""
+    if len(identified) < len(found):
         yield Finding(
             code="not_identifiable",
-            message=f"{len(found) - len(told)} of {len(found)} repeats could not be "
+            message=f"{len(found) - len(identified)} of {len(found)} repeats could not be "
             "identified. See their own warnings.",
             severity="doubt",
             parameters=EVERY,
         )
-    if len({pair.structure for pair in told}) > 1:
+    if len({pair.structure for pair in identified}) > 1:
         yield Finding(
             code="structure",
             message=f"The repeats were found to be {', '.join(pair.structure for pair in found)}. "
@@ -149,26 +154,14 @@ def _unlike(
         )
 
 
-def _recurring(unmodelled: float | None) -> Iterator[Finding]:
-    """Say that so much of the residual, r.m.s., comes back every time."""
-    if unmodelled:
-        yield Finding(
-            code="unmodelled",
-            message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
-            "every repeat, so it is not noise. Look at the residual beside the stimulus.",
-            severity="doubt",
-            parameters=MODELLED,
-        )
-
-
-def _told(name: str, found: tuple[PairIdentification, ...]) -> list[Estimate]:
+def _known(name: str, found: tuple[PairIdentification, ...]) -> list[Estimate]:
     """Estimates of one parameter that have an error."""
     estimates = [e for pair in found if (e := getattr(pair.parameters, name)) is not None]
     return [e for e in estimates if 0 < e.spread < np.inf and min(_sides(e)) > 0]
 
 
 def _sides(one: Estimate) -> tuple[float, float]:
-    """How far the 95 % interval reaches below and above, by a normal error or as stated."""
+    """Reach of the 95 % interval below and above, by a normal error or as stated."""
     low, high = one.ci95 or (None, None)
     if one.std is not None or low is None or high is None:
         return HALF * one.spread, HALF * one.spread
@@ -176,14 +169,14 @@ def _sides(one: Estimate) -> tuple[float, float]:
 
 
 def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedParameter | None:
-    """Average one parameter; None where fewer than two repeats tell it with an error."""
-    estimates = _told(name, found)
+    """Average one parameter; None if fewer than two repeats determine it with an error."""
+    estimates = _known(name, found)
     if len(estimates) < 2:
         return None
     values = np.array([e.value for e in estimates])
-    # An interval that covers several models has its own error on the shorter side. The longer one
-    # reaches to a model that would move all repeats alike: their scatter knows nothing of it, and
-    # one repeat that excludes that model excludes it for all.
+    # An interval that covers several models has its own error on the shorter side. The longer side
+    # reaches to a model that would change all repeats alike, so their scatter does not show it; one
+    # repeat that excludes that model excludes it for all.
     sides = np.array([_sides(e) for e in estimates])
     own = sides.min(axis=1) / HALF
     alike = (sides - HALF * own[:, np.newaxis]).min(axis=0)
@@ -193,7 +186,7 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
     freedom = values.size - 1
     probability = float(scipy.stats.chi2.sf(statistic, freedom))
     widened = max(1.0, statistic / freedom) if probability < FALSE_ALARM else 1.0
-    # Where the scatter is what counts, so are its few degrees of freedom.
+    # If the scatter determines the error, so do its few degrees of freedom.
     average = estimate(
         mean,
         widened / float(weights.sum()),
@@ -217,7 +210,7 @@ def _parameter(name: str, found: tuple[PairIdentification, ...]) -> RepeatedPara
 
 
 def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> Iterator[Finding]:
-    """State once what scatters more than its stated error, and once what scatters less."""
+    """Report once what scatters more than its stated error, and once what scatters less."""
     apart = [p for p in parameters if not p.agree]
     for how, cause in (
         (
@@ -229,35 +222,32 @@ def _doubts(parameters: Sequence[RepeatedParameter], output: str) -> Iterator[Fi
     ):
         found = [p for p in apart if (p.probability < FALSE_ALARM) == (how == "more")]
         if found:
+            ratios = [
+                f"{in_words(p.name)} {float(np.sqrt(p.chi_squared / p.freedom)):.3g} times"
+                for p in found
+            ]
             yield Finding(
                 code="scatter",
                 message=f"From repeat to repeat {output!r} scatters {how} than the stated errors "
-                f"allow: {', '.join(map(_times, found))} the stated error. {cause}",
+                f"allow: {', '.join(ratios)} the stated error. {cause}",
                 severity="doubt",
                 parameters=tuple(p.name for p in found),
             )
 
 
-def _times(parameter: RepeatedParameter) -> str:
-    ratio = float(np.sqrt(parameter.chi_squared / parameter.freedom))
-    return f"{in_words(parameter.name)} {ratio:.3g} times"
-
-
 def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse, float]:
-    """Average the responses on the first one's frequencies; return the relative scatter too."""
+    """Average the responses at the first one's frequencies; also return the relative scatter."""
     frequency = found[0].frequency_response.frequency
     delay = found[0].parameters.delay
     late = 0.0 if delay is None else delay.value
-    responses, stds = [], []
     known = [one for pair in found if (one := pair.frequency_response).frequency.size]
     if not known or not frequency.size:
         return found[0].frequency_response, float("nan")
-    for own in known:
-        straight = own.response * np.exp(2j * np.pi * own.frequency * late)
-        responses.append(np.interp(frequency, own.frequency, straight))
-        stds.append(np.interp(frequency, own.frequency, own.std))
-    values = np.stack(responses)
-    weights = 1.0 / np.maximum(np.stack(stds), np.finfo(float).tiny ** 0.25) ** 2
+    straight = [own.response * np.exp(2j * np.pi * own.frequency * late) for own in known]
+    pairs = zip(known, straight, strict=True)
+    values = np.stack([np.interp(frequency, own.frequency, y) for own, y in pairs])
+    stds = np.stack([np.interp(frequency, own.frequency, own.std) for own in known])
+    weights = 1.0 / np.maximum(stds, np.finfo(float).tiny ** 0.25) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     scatter = np.sum(weights * np.abs(values - mean) ** 2, axis=0) / max(len(known) - 1, 1)
     finite = scatter[np.isfinite(scatter)]
@@ -273,20 +263,19 @@ def _averaged(found: tuple[PairIdentification, ...]) -> tuple[FrequencyResponse,
 
 
 def _split(
-    told: tuple[PairIdentification, ...],
+    identified: tuple[PairIdentification, ...],
 ) -> tuple[Estimate | None, float | None, float | None]:
-    """Split what the models leave over into noise and what comes back every time."""
-    residuals = [pair.residual for pair in told if pair.residual is not None]
+    """Split the residuals into noise and the part that recurs in every repeat."""
+    residuals = [pair.residual for pair in identified if pair.residual is not None]
     if len(residuals) < 2:
         return None, None, None
     length = min(residual.size for residual in residuals)
-    left: Real = np.stack([residual[:length] for residual in residuals])
-    count = left.shape[0]
-    mean = left.mean(axis=0)
-    apart = left - mean
+    stacked: Real = np.stack([residual[:length] for residual in residuals])
+    count, mean = stacked.shape[0], stacked.mean(axis=0)
+    apart = stacked - mean
     freedom = length * (count - 1)
     share = effective_share(apart[0])
-    bias = told[0].parameters.bias
+    bias = identified[0].parameters.bias
     noise = noise_estimate(
         float(np.sum(apart**2)),
         freedom=freedom,
