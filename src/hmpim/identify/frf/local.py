@@ -16,13 +16,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.chance import searched
 from hmpim.identify.frf.choice import choose
-from hmpim.identify.frf.neighbours import (
-    WIDEST,
-    LocalFit,
-    Spectra,
-    centres_in_band,
-    transform,
-)
+from hmpim.identify.frf.neighbours import WIDEST, LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.kept import keeping
@@ -124,13 +118,7 @@ def local_response(
 
 @keeping()
 def local_responses(
-    u: Real,
-    outputs: Real,
-    fs: float,
-    *,
-    band: tuple[float, float],
-    delays: Real,
-    points: int = 400,
+    u: Real, outputs: Real, fs: float, *, band: tuple[float, float], delays: Real, points: int = 400
 ) -> list[FrequencyResponse]:
     """Return the responses of many outputs to one input, each as `local_response` finds it.
 

@@ -19,12 +19,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.columns import Columns
-from hmpim.identify.frf.neighbours import (
-    LocalFit,
-    centres_in_band,
-    mirrored,
-    windows_around,
-)
+from hmpim.identify.frf.neighbours import LocalFit, centres_in_band, mirrored, windows_around
 from hmpim.identify.frf.rational import (
     NUMERATOR,
     TRANSIENT_ORDER,

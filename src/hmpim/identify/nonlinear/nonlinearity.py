@@ -305,8 +305,5 @@ def _own_amplitude(view: SweepView, x: Real, fs: float) -> HarmonicCurve:
             frequency.append(fs * float(np.interp(place, view.along, view.rate)))
             amplitude.append(float(np.std(x[near]) * np.sqrt(2.0)))
     return HarmonicCurve(
-        order=1,
-        frequency=tuple(frequency),
-        amplitude=tuple(amplitude),
-        std=(0.0,) * len(frequency),
+        order=1, frequency=tuple(frequency), amplitude=tuple(amplitude), std=(0.0,) * len(frequency)
     )

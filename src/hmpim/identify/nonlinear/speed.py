@@ -27,13 +27,7 @@ from hmpim.identify.worth import PART, TWICE
 from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
 from hmpim.record import Finding, Intersample
 
-__all__ = [
-    "LimitedCommand",
-    "beside_speed",
-    "explains_more",
-    "limited_command",
-    "speed_finding",
-]
+__all__ = ["LimitedCommand", "beside_speed", "explains_more", "limited_command", "speed_finding"]
 
 _FINE = 8
 """Steps of the finer clock to a sample."""

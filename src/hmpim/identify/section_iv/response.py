@@ -11,14 +11,7 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Real, median
 from hmpim.identify.worth import FEW
 
-__all__ = [
-    "damping_from_hump",
-    "delay_phase",
-    "falling_crossing",
-    "near_dc",
-    "peak_gain",
-    "phase",
-]
+__all__ = ["damping_from_hump", "delay_phase", "falling_crossing", "near_dc", "peak_gain", "phase"]
 
 
 def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
