@@ -1,9 +1,9 @@
-"""Distortion at the lines that a periodic multisine leaves out.
+"""Distortion at the lines that a periodic multisine does not excite.
 
-A linear system answers a sum of sines at its own lines only. What stands at the lines between
-them is noise, the same from period to period on average, or distortion, which repeats: at even
-lines from asymmetric nonlinearities, at odd ones from symmetric ones (J. Schoukens,
-R. Pintelon, Y. Rolain and T. Dobrowiecki, Automatica 41, 2005).
+A linear system responds to a sum of sines at the excited lines only. Output at the lines between
+them is noise, which differs from period to period, or distortion, which repeats: at even lines from
+asymmetric nonlinearities, at odd ones from symmetric ones (J. Schoukens, R. Pintelon, Y. Rolain and
+T. Dobrowiecki, Automatica 41, 2005).
 """
 
 from dataclasses import dataclass
@@ -20,36 +20,22 @@ __all__ = ["LineLevel", "detection_lines", "find_period"]
 Parity = Literal["even", "odd"]
 
 _FEWEST = 4
-"""Lines that a level is averaged over."""
+"""Fewest lines that a level is averaged over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineLevel:
-    """Distortion at lines of one parity.
-
-    Parameters
-    ----------
-    parity : {'even', 'odd'}
-        Even lines show asymmetric nonlinearities, odd ones symmetric.
-    lines : int
-        How many were looked at.
-    rms : float
-        R.m.s. amplitude of one line, noise taken off, in the output's unit.
-    share : float
-        That over the r.m.s. amplitude of the output's excited lines.
-    probability : float
-        Chance of so much, or more, from noise alone.
-    """
+    """Distortion at lines of one parity: even from asymmetric nonlinearities, odd from others."""
 
     parity: Parity
-    lines: int
-    rms: float
-    share: float
-    probability: float
+    lines: int  # their number
+    rms: float  # r.m.s. amplitude of a line without noise, in the output's unit
+    share: float  # the same, over the r.m.s. amplitude of the output's excited lines
+    probability: float  # chance that noise alone produces as much or more
 
 
 def find_period(u: Real) -> int | None:
-    """Samples after which an input, (n,), repeats exactly, at least twice in the record.
+    """Samples after which an input, (n,), repeats exactly; None unless the record has two periods.
 
     Examples
     --------
@@ -78,14 +64,10 @@ def find_period(u: Real) -> int | None:
 
 
 def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
-    """Measure even and odd distortion at the lines that the input leaves out in the excited band.
+    """Measure even and odd distortion at the unexcited lines of the excited band.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Input and output in the steady state, two periods or more; the last whole ones count.
-    period : int
-        Samples per period.
+    Input and output, (n,), are in the steady state over two periods or more; the last whole ones
+    count. The period is in samples.
 
     Examples
     --------
@@ -120,7 +102,7 @@ def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
 
 
 def _level(parity: Parity, line: Complex, scatter: Real, periods: int, signal: float) -> LineLevel:
-    """Compare what repeats with what does not."""
+    """Compare the part that repeats with the part that does not."""
     count = line.size
     noise = float(np.mean(scatter))
     power = float(np.mean(np.abs(line) ** 2))

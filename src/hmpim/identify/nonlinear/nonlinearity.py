@@ -1,9 +1,9 @@
 """Whether the system is linear, and if not, in which way and by how much.
 
-A sweep answers the first question by its harmonics, a multisine by the lines it leaves out,
-any other input by how much better a nonlinear trace explains the residual. Which way is for
-`hmpim.identify.nonlinear.mechanisms`, asked only where there is something to explain. Dependence on
-the amplitude takes several records: `hmpim.identify.records.levels`.
+A sweep shows a nonlinearity by its harmonics, a multisine by output at its unexcited lines, any
+other input by how much better a nonlinear trace explains the residual. If there is one,
+`hmpim.identify.nonlinear.mechanisms` determines its kind. Dependence on the amplitude takes several
+records: `hmpim.identify.records.levels`.
 """
 
 from collections.abc import Sequence
@@ -27,25 +27,25 @@ from hmpim.record import Finding
 __all__ = ["Inspection", "inspect_nonlinearity"]
 
 _LONGEST = 32768
-"""Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
+"""Samples up to which a sweep is analysed as it is; longer ones are first averaged in blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inspection:
-    """What was found.
+    """Result of looking for nonlinearity.
 
     Parameters
     ----------
     seen : Seen
         Results of the tests.
     findings : tuple of Finding
-        Code 'nonlinear' if it matters; then the code of the kind where it can be named:
-        'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
+        Code 'nonlinear' if it matters; then the code of its kind, if it is certain: 'hardening',
+        'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
     fit : Fit
-        The linear fit that goes with it: the given one, or the plainer one where that and one
-        kind of nonlinearity explain the output better.
+        The given linear fit, or the plainer one if that and one kind of nonlinearity explain the
+        output better.
     summary : Nonlinearity
-        The same, as the result keeps it.
+        The same, for the result.
     """
 
     seen: Seen
@@ -65,7 +65,7 @@ def inspect_nonlinearity(
     floor: float = 0.0,
     unit: str = "",
 ) -> Inspection:
-    """Look for nonlinearity in what a linear fit leaves over.
+    """Look for nonlinearity in the residual of a linear fit.
 
     Parameters
     ----------
@@ -76,14 +76,14 @@ def inspect_nonlinearity(
     fs : float
         Rate in Hz.
     plain : Fit, optional
-        Of a plainer structure, to be weighed against `fit` if there is a nonlinearity: a rich
-        structure may have been taken for the sake of what is not linear.
+        Of a plainer structure, compared with `fit` if there is a nonlinearity: a rich structure may
+        only imitate it.
     others : sequence of ndarray, shape (n,)
-        Other inputs that drove the output at the same time: then harmonics alone are asked.
+        Other inputs that drove the output at the same time: then only harmonics are tested.
     floor : float
-        R.m.s. up to which nothing is said, in the output's unit: the error of rounding.
+        R.m.s. up to which an effect is ignored, in the output's unit: the error of rounding.
     unit : str
-        The output's unit, for the sentences.
+        The output's unit, for the messages.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def inspect_nonlinearity(
     shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
-        findings.append(_general(seen, output, shares, asked=not others))
+        findings.append(_general(seen, output, shares, compared=not others))
         if len(named) == 1 and (of_kind := _particular(named[0], unit)) is not None:
             findings.append(of_kind)
     return Inspection(
@@ -123,7 +123,7 @@ def inspect_nonlinearity(
 
 
 def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
-    """Noise, what follows the input at its own frequency, and what no linear system makes."""
+    """Shares of the residual's power: noise, linear in the input, nonlinear."""
     if power <= 0:
         return 0.0, 0.0, 0.0
     if seen.harmonics is None:
@@ -135,7 +135,7 @@ def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
 
 
 def _where(seen: Seen, output: float) -> list[str]:
-    """In words: which harmonics, which lines, or which symmetry."""
+    """Harmonics, lines or symmetry in words."""
     where = []
     if seen.harmonics is not None:
         where = [
@@ -154,21 +154,17 @@ def _where(seen: Seen, output: float) -> list[str]:
 
 
 def _general(
-    seen: Seen, output: float, made_of: tuple[float, float, float], *, asked: bool
+    seen: Seen, output: float, shares: tuple[float, float, float], *, compared: bool
 ) -> Finding:
-    """Say that it is nonlinear, how much, even or odd, and what it may be.
-
-    `made_of` has the shares of the residual's power: noise, linear, nonlinear; `asked` is whether
-    the kinds were compared at all.
-    """
-    noise, linear, nonlinear = (100 * part for part in made_of)
+    """Report a nonlinearity, its size, parity and kind; `compared` if kinds were compared."""
+    noise, linear, nonlinear = (100 * part for part in shares)
     share, effect = seen.rms / output, seen.effect / output
-    names = [KIND_WORDS[one.kind] for one in seen.named]
+    names = [KIND_WORDS[mechanism.kind] for mechanism in seen.named]
     if len(names) == 1:
         guess = f"It looks like {names[0]}."
     elif names:
         guess = f"It may be {' or '.join(names)}; this record does not show which."
-    elif asked:
+    elif compared:
         guess = "None of the kinds tried fits alone."
     else:
         guess = "Drive one input at a time to see which kind it is."
@@ -177,7 +173,7 @@ def _general(
     where = _where(seen, output)
     at = f": {' and '.join(where)}" if where else ""
     left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
-    if seen.harmonics is None:  # a sweep's own frequency tells dynamics left out from noise
+    if seen.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
         left += " or dynamics left out"
     elif linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
@@ -191,7 +187,7 @@ def _general(
 
 
 def _particular(found: Mechanism, unit: str) -> Finding | None:
-    """Say what the kind means, with its number, and what to do about it; None where unnamed.
+    """Explain a kind, its size, and what to do about it; None for those without an explanation.
 
     Examples
     --------
@@ -207,8 +203,8 @@ def _particular(found: Mechanism, unit: str) -> Finding | None:
     match found.kind:
         case "hardening" | "softening":
             way, moves = ("above", "higher") if found.kind == "hardening" else ("below", "lower")
-            # Of a cubic force beside a sinusoid three quarters act like a spring; half of a
-            # spring's change goes into the frequency.
+            # Under a sinusoid, three quarters of a cubic force act like a spring; the frequency
+            # changes by half of the spring's change.
             message = (
                 f"At the largest deflection the restoring force is {share} {way} that of a linear "
                 f"spring, so the natural frequency there is about {percent(0.375 * found.size)} % "
@@ -249,38 +245,31 @@ def _summary(
     unit: str,
     named: tuple[Mechanism, ...],
 ) -> Nonlinearity:
-    """What the result keeps."""
+    """Summarise for the result."""
     even = odd = 0.0
-    curves: tuple[HarmonicCurve, ...] = ()
+    curves: list[HarmonicCurve] = []
     if seen.harmonics is not None:
         even, odd = (seen.harmonics.rms(p) / output for p in (0, 1))
-        curves = (
-            _own_amplitude(
-                seen.harmonics.regression.view,
-                thinned(seen.fit.prediction, look.block),
-                look.fs / look.block,
-            ),
-            *(
-                HarmonicCurve(
-                    order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
-                )
-                for h in seen.harmonics.orders
-            ),
-        )
+        model = thinned(seen.fit.prediction, look.block)
+        curves = [_own_amplitude(seen.harmonics.regression.view, model, look.fs / look.block)]
+        for h in seen.harmonics.orders:
+            curve = HarmonicCurve(
+                order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
+            )
+            curves.append(curve)
     elif seen.mechanisms:
         share = seen.mechanisms[0].rms / output
         even, odd = (share, 0.0) if seen.mechanisms[0].kind == "asymmetry" else (0.0, share)
     size = None
     if len(named) == 1:
-        (one,) = named
-        measures = {"friction": unit, "backlash": unit, "saturation": unit}
-        measures["rate_limit"] = f"{unit}/s" if unit else "1/s"
-        half = HALF * one.size_std
+        found, half = named[0], HALF * named[0].size_std
+        units = {"friction": unit, "backlash": unit, "saturation": unit}
+        units["rate_limit"] = f"{unit}/s" if unit else "1/s"
         size = Estimate(
-            value=one.size,
-            std=one.size_std,
-            ci95=(one.size - half, one.size + half),
-            unit=measures.get(one.kind, ""),
+            value=found.size,
+            std=found.size_std,
+            ci95=(found.size - half, found.size + half),
+            unit=units.get(found.kind, ""),
         )
     noise, linear, nonlinear = shares
     return Nonlinearity(
@@ -292,12 +281,12 @@ def _summary(
         nonlinear=nonlinear,
         kinds=tuple(m.kind for m in named),
         size=size,
-        harmonics=curves,
+        harmonics=tuple(curves),
     )
 
 
 def _own_amplitude(view: SweepView, x: Real, fs: float) -> HarmonicCurve:
-    """Amplitude of the linear model's output along the sweep, where the harmonics are told."""
+    """Amplitude of the linear model's output at the places of the harmonics."""
     frequency, amplitude = [], []
     for place in range(view.places + 1):
         near = view.index[np.abs(view.along - place) < 0.5]
