@@ -3,9 +3,9 @@
 Around each frequency Y_i = Σ_j G_ij U_j + T_i over neighbouring bins, all inputs together, by
 local polynomials and by local rational functions with one denominator for each output:
 Pintelon and Schoukens, System Identification, 2nd ed., Wiley 2012, section 7.3; R. Voorhoeve,
-A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a
-frequency at different times turn their phases differently from bin to bin there, and that is
-what tells them apart. Where they do not, the answer is refused.
+A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a frequency at
+different times turn their phases differently from bin to bin there, which separates their
+responses. Without this difference no response is given.
 """
 
 from collections.abc import Sequence
@@ -36,17 +36,15 @@ from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
-_ORDER = 2  # of T beside polynomials
+_ORDER = 2  # of T in polynomial fits
 _TERMS = NUMERATOR + 1
-# Power of U, relative to its greatest, that counts as none.
-_NOTHING = 1e-24
-# Inputs whose normalised spectra depend on one another to this, over the whole band.
+# Least singular value, over the greatest, of normalised spectra of different inputs.
 _IDENTICAL = 1e-6
 _RATIO = 1.6
 _STEPS = 3
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
-# Samples of an output that must be valid.
+# Fewest valid samples of an output.
 _FEWEST = 16
 
 Integer = NDArray[np.int64]
@@ -65,17 +63,17 @@ class ResponseMatrix:
     std : ndarray, shape (f, p, m)
         √E|error|²; NaN where not `usable`.
     condition : ndarray, shape (f,)
-        Condition number of the inputs' spectra over a quarter of the band around, or, if that
-        is more, of the error of the responses there: 1 for inputs that have nothing in common,
-        infinite for one and the same. Each input counts with its own power, so units and
-        levels do not matter.
+        Condition number of the inputs' spectra over a quarter of the band around, or, if that is
+        larger, of the error of the responses there: 1 for inputs that have nothing in common,
+        infinite for identical ones. Each input is scaled to its own power, so units and levels do
+        not matter.
     usable : bool ndarray, shape (f,)
-        Whether the inputs can be told apart.
+        Whether the inputs can be separated.
     multiple_coherence : ndarray, shape (f, p)
-        Share of the output's power in the window that all inputs together explain, less what
-        as many coefficients explain of noise.
+        Share of the output's power in the window that all inputs together explain, less the share
+        of noise that as many coefficients explain.
     partial_coherence : ndarray, shape (f, p, m)
-        Share that one input explains of what the others leave over, likewise.
+        Share that one input explains of the residual of the others, likewise.
     inputs, outputs : tuple of str
         Names.
     """
@@ -93,14 +91,11 @@ class ResponseMatrix:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Joint:
-    """All inputs to one output by one method at one width.
+    """All inputs to one output by one method at one width."""
 
-    `local` holds arrays of shape (1, c, m); `condition` is (1, c); `coherence` (1, c, m + 1).
-    """
-
-    local: LocalFit
-    condition: Real
-    coherence: Real
+    local: LocalFit  # of shape (1, c, m)
+    condition: Real  # (1, c)
+    coherence: Real  # (1, c, m + 1)
 
 
 def response_matrix(
@@ -127,18 +122,17 @@ def response_matrix(
     fs : float
         Sampling rate, Hz.
     delays : array_like, shape (p, m), (p, 1) or ()
-        Pure delays in s, output over input, not negative; rough values will do.
+        Pure delays in s, output over input, not negative; rough values suffice.
     band : tuple of float
-        Band in which every input has something, Hz.
+        Band that every input excites, Hz.
     valid : array_like of bool, shape (p, n) or (n,), optional
-        False where an output is missing; all of it valid by default.
+        False where an output is missing; all samples are valid by default.
     fill : array_like, shape (p, n), optional
-        What a model predicts of the outputs, bias included, used where they are missing. A
-        smooth curve through the neighbours by default, which serves for gaps short beside a
-        period.
+        A model's prediction of the outputs, bias included, used where they are missing. By default
+        a smooth curve through the neighbours, for gaps that are short compared with a period.
     worst_condition : float
-        Greatest condition number at which inputs still count as told apart, above 1. At 10 the
-        error of the worst combination of inputs is ten times that of the best.
+        Greatest condition number at which inputs count as separated, above 1. At 10 the error of
+        the worst combination of inputs is ten times that of the best.
     points : int
         Greatest number of frequencies; beyond it they are spaced by a constant ratio.
     names : sequence of str, optional
@@ -151,10 +145,10 @@ def response_matrix(
     Raises
     ------
     RecordError
-        For shapes that do not fit, NaN, a constant input, or inputs that are the same over the
-        whole band but for a factor, or sums of others: they are named.
+        For shapes that do not fit, NaN, a constant input, or inputs that are multiples or sums of
+        others over the whole band: they are named.
     ArgumentError
-        For a rate, band, delay, bound or names that cannot be.
+        For an impossible rate, band, delay, bound or names.
 
     Examples
     --------
@@ -206,7 +200,7 @@ def response_matrix(
     condition = np.maximum(inputs_alone, conditions.max(axis=1))
     usable = condition <= worst_condition
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
-    # What is filled in has no residual and says nothing new: both raise the error.
+    # Filled samples have no residual and add no information: both raise the error.
     std = np.sqrt(variance) / share[:, None]
     response[~usable] = complex(np.nan, np.nan)
     std[~usable] = np.nan
@@ -226,10 +220,7 @@ def response_matrix(
 def _filled(
     y: Real, valid: ArrayLike | None, fill: ArrayLike | None, labels: tuple[str, ...]
 ) -> tuple[Real, Real]:
-    """Outputs without gaps, (p, n), and the share of each that was measured, (p,).
-
-    Gaps are filled by a model where there is one, or by a curve through the neighbours.
-    """
+    """Outputs with their gaps filled, (p, n), and the share of each that was measured, (p,)."""
     if valid is None:
         return y, np.ones(y.shape[0])
     mask = np.asarray(valid)
@@ -243,16 +234,16 @@ def _filled(
     if given is not None and given.shape != y.shape:
         raise RecordError(f"fill has shape {given.shape} and outputs {y.shape}; give as many")
     out = y.copy()
-    for i, (row, told, label) in enumerate(zip(out, mask, labels, strict=True)):
-        if np.count_nonzero(told) < _FEWEST:
+    for i, (row, counts, label) in enumerate(zip(out, mask, labels, strict=True)):
+        measured, gaps = np.flatnonzero(counts), np.flatnonzero(~counts)
+        if measured.size < _FEWEST:
             raise RecordError(
-                f"{label} has {np.count_nonzero(told)} valid samples; at least {_FEWEST} are needed"
+                f"{label} has {measured.size} valid samples; at least {_FEWEST} are needed"
             )
-        gaps = np.flatnonzero(~told)
-        if gaps.size and given is None:
-            row[gaps] = scipy.interpolate.PchipInterpolator(np.flatnonzero(told), row[told])(gaps)
-        elif given is not None:
+        if given is not None:
             row[gaps] = given[i, gaps]
+        elif gaps.size:
+            row[gaps] = scipy.interpolate.PchipInterpolator(measured, row[measured])(gaps)
     return out, np.asarray(mask.mean(axis=1))
 
 
@@ -293,7 +284,7 @@ def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
 
 
 def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
-    """Name the inputs that are one and the same over the band, or sums of others."""
+    """Refuse inputs that are multiples or sums of others over the band, and name them."""
     spectra = scipy.fft.rfft(u, axis=1)[:, low : high + 1]
     size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=1))
     if np.any(size == 0):
@@ -314,9 +305,9 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
 
 
 def _input_condition(u: Complex, centre: Integer) -> Real:
-    """Condition number of the inputs' spectra around each centre, each of unit power.
+    """Condition number of the inputs' spectra around each centre, each scaled to unit power.
 
-    A wide window may tell inputs apart by what it sees far off; that much near by is asked for.
+    A wide window may separate inputs by distant bins only; they must differ near the centre too.
     """
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (u.shape[0] + 1))
     reach = min(reach, u.shape[1] - 1)
@@ -331,7 +322,7 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
 def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
     """Transforms of the inputs, each delayed as its response is, less `base` samples.
 
-    At rest before the record nothing is lost: what moves in is the first value, held.
+    An input is at rest before the record: its first value fills the start.
     """
     length = u.shape[1] - base
     moved = np.empty((u.shape[0], length))
@@ -352,7 +343,7 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, R
     """Fit one output at every width, and choose at each centre.
 
     Returned are the responses and their variances, (c, m), the condition, (c,), and the coherence,
-    (c, m + 1), of each input and, last, of all.
+    (c, m + 1), of each input and of all.
     """
     spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
@@ -384,7 +375,7 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, R
 
 
 def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tuple[int, ...]:
-    """Return half the band, and less by a constant ratio, as far as each can be paid for."""
+    """Return half the band, and less by a constant ratio, if each is affordable."""
     span = int(centre[-1] - centre[0] + 1)
     top = min(span // 2, (u.shape[1] - 2) // 2)
     widths = {top}
@@ -398,24 +389,24 @@ def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tup
 def _fits(
     u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
 ) -> tuple[_Joint, _Joint]:
-    """Fit with T and without: rational functions where `smooth` is given to start from."""
+    """Fit with T and without: rational functions if `smooth` is given to start from."""
     order = _ORDER if smooth is None else TRANSIENT_ORDER
     own = Regressors.around(u, centre, width, transient=order)
-    seen = own.views(y[None])
+    outputs = own.views(y[None])
     found = []
     for columns in (own.both, own.plain):
         if smooth is None:
-            found.append(_joint(own, columns, _polynomial(columns, seen), seen))
+            found.append(_joint(own, columns, _polynomial(columns, outputs), outputs))
             continue
-        with np.errstate(all="ignore"):  # an iterate may run off to infinity; it is not taken
+        with np.errstate(all="ignore"):  # an iterate may diverge; it is then not used
             start = linear_start(columns, own.views(smooth[None]))
-            ended = gauss_newton(columns, seen, start, steps=_STEPS)
-            found.append(_joint(own, columns, ended, seen))
+            solution = gauss_newton(columns, outputs, start, steps=_STEPS)
+            found.append(_joint(own, columns, solution, outputs))
     return found[0], found[1]
 
 
 def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Complex) -> _Joint:
-    """What one fit over each window says at each centre, of all inputs together."""
+    """Responses, condition and coherence at each centre from one fit over each window."""
     m, near = own.power.shape[1], own.windows.near
     local, moved = read_off(own, columns, found, y)
     slope = own.at_centres(moved.swapaxes(2, 3))
@@ -431,10 +422,10 @@ def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Comple
 
 
 def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
-    """Share of what is left without an input's columns that they explain, adjusted for number.
+    """Share of the residual without an input's columns that they explain, adjusted for number.
 
-    What Σ|residual|² grows by without them is θᴴ V⁻¹ θ over their own block. Of outputs of power
-    `total`, (w, r); shape (w, r, m + 1).
+    Without them Σ|residual|² grows by θᴴ V⁻¹ θ over their own block. `total`, (w, r), is the power
+    of the outputs; the result has shape (w, r, m + 1).
     """
     m = own.power.shape[1]
     squares = np.maximum(found.state.squares, 1e-15 * total)
