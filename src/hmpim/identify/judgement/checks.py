@@ -32,13 +32,13 @@ from hmpim.identify.judgement.residual import (
 )
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
-from hmpim.identify.judgement.verdict import UNTOLD, doubted
+from hmpim.identify.judgement.verdict import UNKNOWN, doubted
 from hmpim.record import Finding
 
 __all__ = ["CHECKS", "Check", "judge"]
 
 Check = Callable[[Evidence], Iterable[Finding]]
-"""Looks at the evidence and says what it finds, if anything."""
+"""A function from the evidence to findings."""
 
 CHECKS: tuple[Check, ...] = (
     initial_transient,
@@ -83,7 +83,7 @@ SAMPLED: tuple[Check, ...] = (
     halves_disagree,
     noise_colour_of,
 )
-"""Those that ask something of software, which has neither poles beyond the band nor a clock."""
+"""Those for software, which has neither poles beyond the band nor a clock."""
 
 
 _OF_THE_RESIDUAL: frozenset[Check] = frozenset(
@@ -92,33 +92,33 @@ _OF_THE_RESIDUAL: frozenset[Check] = frozenset(
         *(uneven_noise, unsampled_input, feedback, other_order, missed_pole),
     }
 )
-"""Those that ask something of the residual; nothing where that is the error of interpolation."""
+"""Those of the residual, which are omitted if that is only the error of interpolation."""
 
 
 def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple[Finding, ...]:
-    """Make every check, by default `CHECKS`, of software `SAMPLED`, and return what they find.
+    """Make every check, by default `CHECKS`, for software `SAMPLED`, and return the findings.
 
-    One that raises costs itself and stands as 'check_failed'. Where all is explained to the last
-    digit, those that ask something of the residual are left out.
+    A check that raises gives 'check_failed', and the others go on.
     """
     if checks is None:
         checks = SAMPLED if evidence.joint.best.fit.structure.sampled else CHECKS
     if evidence.is_without_noise:
         checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
-    nothing: tuple[Finding, ...] = ()
     for check in checks:
-        said, failure = attempt(check.__name__, partial(_said, check, evidence), nothing)
-        found += [*said, *failure]
-    # Of figures that are not given there is nothing more to say.
-    untold = doubted(one for one in found if one.code in UNTOLD)
+        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), ())
+        found += [*made, *failure]
+    # Figures that are not given need no further remark.
+    unknown = doubted(finding for finding in found if finding.code in UNKNOWN)
     return tuple(
-        one
-        for one in found
-        if one.severity == "doubt" or not one.parameters or not untold.issuperset(one.parameters)
+        finding
+        for finding in found
+        if finding.severity == "doubt"
+        or not finding.parameters
+        or not unknown.issuperset(finding.parameters)
     )
 
 
-def _said(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
-    """Return all that a check finds, looked for here and now."""
+def _findings_of(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
+    """Run a generator to its end."""
     return tuple(check(evidence))
