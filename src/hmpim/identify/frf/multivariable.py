@@ -170,7 +170,11 @@ def response_matrix(
         )
     check_rate(fs)
     check_band(band, fs)
-    labels_u, labels_y = _checked_names(names, m, p)
+    numbered = [*(f"input {k}" for k in range(m)), *(f"output {k}" for k in range(p))]
+    labels = tuple(numbered if names is None else names)
+    if len(labels) != m + p:
+        raise ArgumentError(f"names holds {len(labels)}; give {m} of inputs and {p} of outputs")
+    labels_u, labels_y = labels[:m], labels[m:]
     late = _checked_delays(delays, p, m, u.shape[1] / fs)
     if not worst_condition > 1:
         raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
@@ -256,17 +260,6 @@ def _checked_signals(name: str, values: ArrayLike) -> Real:
     return array
 
 
-def _checked_names(
-    names: Sequence[str] | None, m: int, p: int
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    if names is None:
-        return tuple(f"input {k}" for k in range(m)), tuple(f"output {k}" for k in range(p))
-    given = tuple(names)
-    if len(given) != m + p:
-        raise ArgumentError(f"names holds {len(given)}; give {m} of inputs and {p} of outputs")
-    return given[:m], given[m:]
-
-
 def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
     late = np.asarray(delays, dtype=np.float64)
     try:
@@ -275,10 +268,10 @@ def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
         raise ArgumentError(
             f"delays has shape {late.shape}; give ({p}, {m}), output over input"
         ) from None
-    if not np.all((late >= 0) & (late < length / 2)):
+    wrong = late[~((late >= 0) & (late < length / 2))]
+    if wrong.size:
         raise ArgumentError(
-            f"delays holds {late[~((late >= 0) & (late < length / 2))][0]} s; give 0 or more, "
-            "and less than half the record"
+            f"delays holds {wrong[0]} s; give 0 or more, and less than half the record"
         )
     return np.asarray(late)
 
@@ -347,22 +340,16 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, R
     """
     spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
-    polynomials = [
-        fit
-        for width in _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
-        for fit in _fits(u, spectrum, centre, width, None)
-    ]
+    widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
+    polynomials = [fit for width in widths for fit in _fits(u, spectrum, centre, width, None)]
     _, (g,), _ = choose([fit.local for fit in polynomials], [])
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectrum.copy()
     smooth[inside] = sum(
         u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
     )
-    rationals = [
-        fit
-        for width in _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
-        for fit in _fits(u, spectrum, centre, width, smooth)
-    ]
+    widths = _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
+    rationals = [fit for width in widths for fit in _fits(u, spectrum, centre, width, smooth)]
     best, response, variance = choose(
         [fit.local for fit in polynomials], [fit.local for fit in rationals]
     )
@@ -388,7 +375,7 @@ def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tup
 
 def _fits(
     u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
-) -> tuple[_Joint, _Joint]:
+) -> list[_Joint]:
     """Fit with T and without: rational functions if `smooth` is given to start from."""
     order = _ORDER if smooth is None else TRANSIENT_ORDER
     own = Regressors.around(u, centre, width, transient=order)
@@ -402,7 +389,7 @@ def _fits(
             start = linear_start(columns, own.views(smooth[None]))
             solution = gauss_newton(columns, outputs, start, steps=_STEPS)
             found.append(_joint(own, columns, solution, outputs))
-    return found[0], found[1]
+    return found
 
 
 def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Complex) -> _Joint:

@@ -105,8 +105,9 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     if evidence.is_without_noise:
         checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
+    nothing: tuple[Finding, ...] = ()
     for check in checks:
-        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), ())
+        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), nothing)
         found += [*made, *failure]
     # Figures that are not given need no further remark.
     unknown = doubted(finding for finding in found if finding.code in UNKNOWN)

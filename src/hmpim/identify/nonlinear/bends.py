@@ -52,36 +52,16 @@ _ALIKE = 1e-8
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bend:
-    """One kind of nonlinearity that the record does not exclude.
-
-    Parameters
-    ----------
-    kind : str
-        Name as in `hmpim.identify.nonlinear.mechanisms`.
-    gain : float
-        Log-likelihood that it gains.
-    certain : bool
-        Whether the likeliest kind gains more than the record of a linear unit would by chance.
-    effect : float
-        R.m.s. of its whole effect, over that of the output about its mean.
-    share : float
-        Share of the residual's power that it explains.
-    white : bool
-        Whether the residual is white once the likeliest kind is taken out.
-    fit : Fit
-        The linear fit to which it is added.
-    moved : ndarray, shape (p,)
-        What it adds to the parameters of that fit: `theta`, then `linear`.
-    """
+    """One kind of nonlinearity that the record does not exclude."""
 
     kind: Kind
-    gain: float
-    certain: bool
-    effect: float
-    share: float
-    white: bool
-    fit: Fit
-    moved: Real
+    gain: float  # log-likelihood that it gains
+    certain: bool  # whether the likeliest kind gains more than a linear unit would by chance
+    effect: float  # r.m.s. of its whole effect, over that of the output about its mean
+    share: float  # share of the residual's power that it explains
+    white: bool  # whether the residual is white without the likeliest kind
+    fit: Fit  # the linear fit to which it is added
+    moved: Real  # (p,): its effect on the parameters of that fit, `theta`, then `linear`
 
     @property
     def matters(self) -> bool:

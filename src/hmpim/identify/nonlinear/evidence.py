@@ -20,7 +20,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, co
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
-__all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
+__all__ = ["Outcome", "Subject", "are_curved", "better_of", "inspect_fit", "thinned"]
 
 _BLOCK = 16_384
 """Samples whose products are summed at once: they fit into a processor's cache."""
@@ -30,27 +30,27 @@ _GAIN = searched(36)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Look:
-    """The record to analyse, in blocks of samples if it is long."""
+class Subject:
+    """The record under test, averaged in blocks of samples if it is long."""
 
-    u: Real
+    u: Real  # (n,): input
     problem: Problem
-    fs: float
-    others: tuple[Real, ...]
-    sweep: SweepPhase | None
-    block: int
+    fs: float  # Hz
+    others: tuple[Real, ...]  # other inputs that drove the output at the same time
+    sweep: SweepPhase | None  # of the averaged input, if that is a sweep
+    block: int  # samples per block
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Seen:
+class Outcome:
     """Results of the tests of one linear fit."""
 
     fit: Fit
     harmonics: Harmonics | None = None
     lines: tuple[LineLevel, ...] = ()
-    mechanisms: tuple[Mechanism, ...] = ()
-    named: tuple[Mechanism, ...] = ()
-    rms: float = 0.0
+    mechanisms: tuple[Mechanism, ...] = ()  # the likeliest first
+    named: tuple[Mechanism, ...] = ()  # those of them that remain possible
+    rms: float = 0.0  # of the nonlinear part, in the output's unit
 
     @property
     def effect(self) -> float:
@@ -67,30 +67,30 @@ def thinned(x: Real, block: int) -> Real:
     return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
-def look_at(look: Look, fit: Fit) -> Seen:
+def inspect_fit(subject: Subject, fit: Fit) -> Outcome:
     """Make all tests that the input allows; a white residual gets a quick test first."""
-    counted = slice(None) if look.problem.valid is None else look.problem.valid
+    counted = slice(None) if subject.problem.valid is None else subject.problem.valid
     white = is_white(fit.residual[counted])
-    if look.sweep is not None:
-        return _by_harmonics(look, look.sweep, fit, white)
-    return Seen(fit=fit) if look.others else _by_traces(look, fit, white)
+    if subject.sweep is not None:
+        return _by_harmonics(subject, subject.sweep, fit, white)
+    return Outcome(fit=fit) if subject.others else _by_traces(subject, fit, white)
 
 
-def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
-    """Measure the harmonics of a sweep, and find which kind makes them."""
-    residual = thinned(fit.residual, look.block)
-    rate, delay = look.fs / look.block, fit.delay / look.fs
+def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) -> Outcome:
+    """Measure the harmonics of a sweep, and find the kinds that may make them."""
+    residual = thinned(fit.residual, subject.block)
+    rate, delay = subject.fs / subject.block, fit.delay / subject.fs
     if (
         white
         and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM
-        and not _curved(fit, look.problem)
+        and not _curved(fit, subject.problem)
     ):
-        return Seen(fit=fit)
-    phases = [sweep_phase(thinned(other, look.block), rate) for other in look.others]
+        return Outcome(fit=fit)
+    phases = [sweep_phase(thinned(other, subject.block), rate) for other in subject.others]
     others = [phase for phase in phases if phase is not None]
     harmonics = sweep_harmonics(residual, sweep, rate, delay=delay, others=others)
     if harmonics is None:
-        return Seen(fit=fit)
+        return Outcome(fit=fit)
     # No order exceeds the whole residual: if few samples count, orders may cancel each other.
     most = float(np.sqrt(np.mean(residual**2)))
     orders = tuple(replace(order, rms=min(order.rms, most)) for order in harmonics.orders)
@@ -98,42 +98,42 @@ def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
     significant = bool(parts) or harmonics.regression.evidence > LIKELIER
-    if significant and not look.others and np.ptp(fit.prediction) > 0:
+    if significant and not subject.others and np.ptp(fit.prediction) > 0:
         powers = np.arange(fit.denominator.size)
         kinds = compare_harmonics(
             harmonics.regression,
-            thinned(fit.prediction - fit.linear[-1], look.block),
-            fit.denominator / float(look.block) ** powers,
+            thinned(fit.prediction - fit.linear[-1], subject.block),
+            fit.denominator / float(subject.block) ** powers,
             fs=rate,
         )
     named = _likely(kinds, harmonics.regression.evidence)
     if not parts and not named:
-        return Seen(fit=fit, harmonics=harmonics)
+        return Outcome(fit=fit, harmonics=harmonics)
     rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
-    return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
+    return Outcome(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
 
 
-def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
+def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
     """Test unexcited lines, if the input repeats, and whether any kind explains the residual."""
-    u, problem = look.u, look.problem
+    u, problem = subject.u, subject.problem
     period = find_period(u)
     lines: tuple[LineLevel, ...] = ()
     if period is not None and problem.valid is None and u.size >= 3 * period:
         lines = detection_lines(u[period:], problem.y[period:], period=period)  # after transients
     levels = [v for v in lines if v.probability < FALSE_ALARM]
     if white and not levels and not _curved(fit, problem):
-        return Seen(fit=fit, lines=lines)
+        return Outcome(fit=fit, lines=lines)
     power = fit.cost / max(problem.counted, 1)
     least = 0.0
     if not white:  # missing dynamics resemble every kind a little, more so with few lines
         least = power * (PART if period is None else MOST)
     found = tuple(
         m
-        for m in compare_mechanisms(problem, fit, fs=look.fs)
+        for m in compare_mechanisms(problem, fit, fs=subject.fs)
         if m.gain > _GAIN and m.rms**2 > least
     )
     distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
-    return Seen(
+    return Outcome(
         fit=fit,
         lines=lines,
         mechanisms=found,
@@ -157,20 +157,20 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
 
 
-def plainer_of(look: Look, rich: Seen, plain: Seen) -> Seen:
+def better_of(subject: Subject, rich: Outcome, plain: Outcome) -> Outcome:
     """The fit that, with its likeliest kind, explains more by Schwarz's criterion."""
-    return min(rich, plain, key=lambda one: _criterion(look, one))
+    return min(rich, plain, key=lambda outcome: _criterion(subject, outcome))
 
 
-def _criterion(look: Look, seen: Seen) -> float:
+def _criterion(subject: Subject, outcome: Outcome) -> float:
     """Bayesian criterion of a linear fit, with its likeliest kind if there is any."""
-    e = thinned(seen.fit.residual, look.block)
-    unknown, cost = seen.fit.structure.parameters, float(e @ e)
-    if seen.named and seen.named[0].trace.size == e.size:
-        trace = seen.named[0].trace
-        if look.problem.valid is not None:
-            trace = trace * thinned(look.problem.valid.astype(np.float64), look.block)
-        rows = [thinned(row, look.block) for row in jacobian(look.problem, seen.fit)]
+    e = thinned(outcome.fit.residual, subject.block)
+    unknown, cost = outcome.fit.structure.parameters, float(e @ e)
+    if outcome.named and outcome.named[0].trace.size == e.size:
+        trace = outcome.named[0].trace
+        if subject.problem.valid is not None:
+            trace = trace * thinned(subject.problem.valid.astype(np.float64), subject.block)
+        rows = [thinned(row, subject.block) for row in jacobian(subject.problem, outcome.fit)]
         basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
         cost -= float(np.sum((basis.T @ e) ** 2))
         unknown += 1

@@ -49,8 +49,8 @@ class SweepView:
     orders: tuple[int, ...]  # those below the Nyquist frequency for part of the sweep
 
 
-def _phase_at(sweep: SweepPhase, time: Real) -> Real:
-    return np.asarray(np.interp(time, np.arange(sweep.phase.size), sweep.phase))
+def _phase_at(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> Real:
+    return np.asarray(np.interp(index - late, np.arange(sweep.phase.size), sweep.phase))
 
 
 def view_of(e: Real, sweep: SweepPhase, fs: float, delay: float) -> SweepView | None:
@@ -61,7 +61,7 @@ def view_of(e: Real, sweep: SweepPhase, fs: float, delay: float) -> SweepView | 
     index = np.flatnonzero(inside & (e != 0.0))
     if index.size < _FEWEST:
         return None
-    phase = _phase_at(sweep, index - late)
+    phase = _phase_at(sweep, index, late)
     rate = np.interp(index - late, np.arange(e.size), sweep.frequency) / fs
     orders = [k for k in _ORDERS if np.count_nonzero(k * rate < 0.5 * HIGHEST) > 50]
     span = float(phase[-1] - phase[0])
@@ -163,7 +163,7 @@ def fit_harmonics(
 
     The regression includes the frequencies of other inputs' sweeps.
     """
-    columns = columns_of(view, [_phase_at(other, view.index - late) for other in others])
+    columns = columns_of(view, [_phase_at(other, view.index, late) for other in others])
     e = e[view.index]
     weights, _, _ = _solved(_gram(columns, view), _moments(e[None], columns, view)[0])
     count = columns.shape[0]

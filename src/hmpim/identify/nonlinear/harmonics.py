@@ -30,50 +30,24 @@ __all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Harmonic:
-    """One order.
+    """One order; amplitudes are in the residual's unit."""
 
-    Parameters
-    ----------
-    order : int
-        Multiple of the sweep's frequency.
-    rms : float
-        Its r.m.s. over the sweep in the residual's unit, without the noise there.
-    probability : float
-        Chance that noise alone produces as much or more.
-    frequency, amplitude, std : tuple of float
-        Amplitude of the harmonic and its standard deviation, in the residual's unit, at the sweep's
-        own `frequency` in Hz; places that the order does not reach are omitted.
-    """
-
-    order: int
-    rms: float
-    probability: float
-    frequency: tuple[float, ...]
-    amplitude: tuple[float, ...]
-    std: tuple[float, ...]
+    order: int  # multiple of the sweep's frequency
+    rms: float  # over the sweep, without the noise
+    probability: float  # chance that noise alone produces as much or more
+    frequency: tuple[float, ...]  # Hz, of the sweep itself, at places that the order reaches
+    amplitude: tuple[float, ...]  # of the harmonic at these places
+    std: tuple[float, ...]  # standard deviation of the amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Harmonics:
-    """The parts of a linear fit's residual over the sweep.
+    """The parts of a linear fit's residual over the sweep."""
 
-    Parameters
-    ----------
-    orders : tuple of Harmonic
-        Those of orders 2 to 5 that lie below the Nyquist frequency for part of the sweep.
-    fundamental_rms : float
-        R.m.s. of the part that follows the sweep at its own frequency: linear misfit, and the part
-        of a nonlinearity that looks linear.
-    noise_rms : float
-        R.m.s. of the rest.
-    regression : HarmonicFit
-        The regression that gave them.
-    """
-
-    orders: tuple[Harmonic, ...]
-    fundamental_rms: float
-    noise_rms: float
-    regression: HarmonicFit
+    orders: tuple[Harmonic, ...]  # 2 to 5, if below the Nyquist frequency for part of the sweep
+    fundamental_rms: float  # of order 1: linear misfit, and a nonlinearity that looks linear
+    noise_rms: float  # of the rest
+    regression: HarmonicFit  # the regression that gave them
 
     def rms(self, parity: int) -> float:
         """R.m.s. of all even (0) or odd (1) orders together."""

@@ -104,37 +104,20 @@ _LAGS = 8
 class Mechanism:
     """The best fit of one kind of nonlinearity to the residual.
 
-    Parameters
-    ----------
-    kind : str
-        Name as in the module's table.
-    size : float
-        Hardening, softening: relative deviation of the force from proportionality at the largest
-        deflection. Asymmetry, curvature: the same of the output. Friction, backlash: half width of
-        the band, in the output's unit. Rate limit: speed, in that unit per second. Saturation:
-        distance of the plateau from the bias, in that unit.
-    size_std : float
-        Standard deviation; for a size from a list, half the spacing of the list.
-    gain : float
-        Log-likelihood gained over no nonlinearity, in noise of the same colour.
-    likelihood : float
-        Log-likelihood, without a constant that is the same for all kinds.
-    rms : float
-        R.m.s. of the part of its effect that no linear change explains, in the output's unit.
-    effect : float
-        R.m.s. of its whole effect, in the output's unit.
-    trace : ndarray, shape (n,)
-        Its effect in the output, up to a factor, over the samples analysed.
+    The size of hardening, softening, asymmetry and curvature is the relative deviation of force or
+    output from proportionality at the largest deflection. That of friction and backlash is the half
+    width of the band, that of saturation the distance of the plateau from the bias, both in the
+    output's unit. That of a rate limit is the speed, in the same unit per second.
     """
 
     kind: Kind
     size: float
-    size_std: float
-    gain: float
-    likelihood: float
-    rms: float
-    effect: float
-    trace: Real
+    size_std: float  # standard deviation; for a size from a list, half the spacing of the list
+    gain: float  # log-likelihood gained over no nonlinearity, in noise of the same colour
+    likelihood: float  # log-likelihood, up to a constant that is the same for all kinds
+    rms: float  # of the part that no linear change explains, in the output's unit
+    effect: float  # r.m.s. of the whole effect, in the output's unit
+    trace: Real  # (n,): effect in the output, up to a factor, over the samples analysed
 
 
 def play(x: Real, half_gap: float) -> Real:

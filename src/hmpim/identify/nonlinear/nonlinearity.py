@@ -14,7 +14,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit, thinned
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
 from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
@@ -32,26 +32,13 @@ _LONGEST = 32768
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inspection:
-    """Result of looking for nonlinearity.
+    """Result of the search for a nonlinearity."""
 
-    Parameters
-    ----------
-    seen : Seen
-        Results of the tests.
-    findings : tuple of Finding
-        Code 'nonlinear' if it matters; then the code of its kind, if it is certain: 'hardening',
-        'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
-    fit : Fit
-        The given linear fit, or the plainer one if that and one kind of nonlinearity explain the
-        output better.
-    summary : Nonlinearity
-        The same, for the result.
-    """
-
-    seen: Seen
-    findings: tuple[Finding, ...]
+    seen: Outcome
+    findings: tuple[Finding, ...]  # 'nonlinear' if it matters, then its kind if that is certain
+    # the given linear fit, or the plainer one if that and one kind explain the output better
     fit: Fit
-    summary: Nonlinearity
+    summary: Nonlinearity  # the same, for the result
 
 
 def inspect_nonlinearity(
@@ -102,64 +89,64 @@ def inspect_nonlinearity(
     output = float(np.std(counted))
     block = -(-u.size // _LONGEST)
     sweep = sweep_phase(thinned(u, block), fs / block)
-    look = Look(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
-    seen = look_at(look, fit)
-    if plain is not None and seen.rms > 0:
-        seen = plainer_of(look, seen, look_at(look, plain))
-    matters = seen.effect > WORTH * output and seen.rms > floor
-    named = seen.named if matters else ()
-    shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
+    subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
+    outcome = inspect_fit(subject, fit)
+    if plain is not None and outcome.rms > 0:
+        outcome = better_of(subject, outcome, inspect_fit(subject, plain))
+    matters = outcome.effect > WORTH * output and outcome.rms > floor
+    named = outcome.named if matters else ()
+    shares = _shares(outcome, outcome.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
-        findings.append(_general(seen, output, shares, compared=not others))
+        findings.append(_general(outcome, output, shares, compared=not others))
         if len(named) == 1 and (of_kind := _particular(named[0], unit)) is not None:
             findings.append(of_kind)
     return Inspection(
-        seen=seen,
+        seen=outcome,
         findings=tuple(findings),
-        fit=seen.fit if matters else fit,
-        summary=_summary(look, seen, shares, output, unit=unit, named=named),
+        fit=outcome.fit if matters else fit,
+        summary=_summary(subject, outcome, shares, output, unit=unit, named=named),
     )
 
 
-def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
+def _shares(outcome: Outcome, power: float) -> tuple[float, float, float]:
     """Shares of the residual's power: noise, linear in the input, nonlinear."""
     if power <= 0:
         return 0.0, 0.0, 0.0
-    if seen.harmonics is None:
-        nonlinear = min(seen.rms**2 / power, 1.0)
+    if outcome.harmonics is None:
+        nonlinear = min(outcome.rms**2 / power, 1.0)
         return 1.0 - nonlinear, 0.0, nonlinear
-    parts = np.square([seen.harmonics.noise_rms, seen.harmonics.fundamental_rms, seen.rms])
+    parts = np.square([outcome.harmonics.noise_rms, outcome.harmonics.fundamental_rms, outcome.rms])
     noise, linear, nonlinear = parts / parts.sum()
     return float(noise), float(linear), float(nonlinear)
 
 
-def _where(seen: Seen, output: float) -> list[str]:
+def _where(outcome: Outcome, output: float) -> list[str]:
     """Harmonics, lines or symmetry in words."""
     where = []
-    if seen.harmonics is not None:
+    if outcome.harmonics is not None:
         where = [
-            f"{percent(seen.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
+            f"{percent(outcome.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
             for name, parity in (("odd", 1), ("even", 0))
-            if seen.harmonics.probability(parity) < FALSE_ALARM
+            if outcome.harmonics.probability(parity) < FALSE_ALARM
         ]
-    elif seen.mechanisms:
-        even = seen.mechanisms[0].kind == "asymmetry"
+    elif outcome.mechanisms:
+        even = outcome.mechanisms[0].kind == "asymmetry"
         where = [f"{'even' if even else 'odd'} in the deflection"]
     return where + [
         f"{percent(level.share)} % at {level.parity} lines left out"
-        for level in seen.lines
+        for level in outcome.lines
         if level.probability < FALSE_ALARM
     ]
 
 
 def _general(
-    seen: Seen, output: float, shares: tuple[float, float, float], *, compared: bool
+    outcome: Outcome, output: float, shares: tuple[float, float, float], *, compared: bool
 ) -> Finding:
     """Report a nonlinearity, its size, parity and kind; `compared` if kinds were compared."""
     noise, linear, nonlinear = (100 * part for part in shares)
-    share, effect = seen.rms / output, seen.effect / output
-    names = [KIND_WORDS[mechanism.kind] for mechanism in seen.named]
+    share, effect = outcome.rms / output, outcome.effect / output
+    names = [KIND_WORDS[mechanism.kind] for mechanism in outcome.named]
     if len(names) == 1:
         guess = f"It looks like {names[0]}."
     elif names:
@@ -170,10 +157,10 @@ def _general(
         guess = "Drive one input at a time to see which kind it is."
     if effect > (1 + MOST) * share:
         guess += f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
-    where = _where(seen, output)
+    where = _where(outcome, output)
     at = f": {' and '.join(where)}" if where else ""
     left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
-    if seen.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
+    if outcome.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
         left += " or dynamics left out"
     elif linear >= 0.5:
         left += f"; {linear:.0f} % still follows the input"
@@ -181,7 +168,7 @@ def _general(
         code="nonlinear",
         message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {left}. "
         "Identify at several amplitudes to see where the linear model holds.",
-        severity="doubt" if seen.effect > MATERIAL * output else "info",
+        severity="doubt" if outcome.effect > MATERIAL * output else "info",
         parameters=MODELLED,
     )
 
@@ -237,8 +224,8 @@ def _particular(found: Mechanism, unit: str) -> Finding | None:
 
 
 def _summary(
-    look: Look,
-    seen: Seen,
+    subject: Subject,
+    outcome: Outcome,
     shares: tuple[float, float, float],
     output: float,
     *,
@@ -248,18 +235,20 @@ def _summary(
     """Summarise for the result."""
     even = odd = 0.0
     curves: list[HarmonicCurve] = []
-    if seen.harmonics is not None:
-        even, odd = (seen.harmonics.rms(p) / output for p in (0, 1))
-        model = thinned(seen.fit.prediction, look.block)
-        curves = [_own_amplitude(seen.harmonics.regression.view, model, look.fs / look.block)]
-        for h in seen.harmonics.orders:
+    if outcome.harmonics is not None:
+        even, odd = (outcome.harmonics.rms(p) / output for p in (0, 1))
+        model = thinned(outcome.fit.prediction, subject.block)
+        curves = [
+            _own_amplitude(outcome.harmonics.regression.view, model, subject.fs / subject.block)
+        ]
+        for h in outcome.harmonics.orders:
             curve = HarmonicCurve(
                 order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
             )
             curves.append(curve)
-    elif seen.mechanisms:
-        share = seen.mechanisms[0].rms / output
-        even, odd = (share, 0.0) if seen.mechanisms[0].kind == "asymmetry" else (0.0, share)
+    elif outcome.mechanisms:
+        share = outcome.mechanisms[0].rms / output
+        even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)
     size = None
     if len(named) == 1:
         found, half = named[0], HALF * named[0].size_std
@@ -273,7 +262,7 @@ def _summary(
         )
     noise, linear, nonlinear = shares
     return Nonlinearity(
-        share=seen.rms / output if output else 0.0,
+        share=outcome.rms / output if output else 0.0,
         even=even,
         odd=odd,
         noise=noise,
