@@ -45,10 +45,9 @@ def bent(evidence: Evidence) -> Iterator[Finding]:
     if not likeliest.white and linear > nonlinear:
         yield Finding(
             code="other_dynamics",
-            message="The record requires dynamics other than the model's: of the residual's "
-            f"power {percent(linear)} % follows the input as that of a linear system does, "
-            f"and {kinds} would explain {percent(nonlinear)} %. Sweep higher, or use the measured "
-            "response.",
+            message="The record requires dynamics other than the model's: of the residual's power "
+            f"{percent(linear)} % follows the input as that of a linear system does, and {kinds} "
+            f"would explain {percent(nonlinear)} %. Sweep higher, or use the measured response.",
             severity="doubt",
             parameters=parameters,
         )
@@ -61,9 +60,8 @@ def bent(evidence: Evidence) -> Iterator[Finding]:
     which = f" It shifts figures of the linear model: {', '.join(sized)}." if sized else ""
     yield Finding(
         code="nonlinear",
-        message=f"The residual looks like {kinds}, "
-        f"{percent(likeliest.effect)} % of the output (r.m.s.).{which} Identify at several "
-        "amplitudes to see where the linear model holds.",
+        message=f"The residual looks like {kinds}, {percent(likeliest.effect)} % of the output "
+        f"(r.m.s.).{which} Identify at several amplitudes to see where the linear model holds.",
         severity="doubt",
         parameters=parameters,
     )

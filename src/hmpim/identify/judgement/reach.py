@@ -128,10 +128,9 @@ def fast_mode(evidence: Evidence) -> Iterator[Finding]:
         return
     yield Finding(
         code="extrapolated",
-        message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
-        f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
-        "constant, or the clocks may drift apart. Check the time stamps, or "
-        f"{_sweep_to(fastest, evidence)}.",
+        message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond the "
+        f"excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be constant, "
+        f"or the clocks may drift apart. Check the time stamps, or {_sweep_to(fastest, evidence)}.",
         severity="doubt",
         parameters=evidence.of_other_poles,
     )

@@ -51,11 +51,10 @@ def _plainer(evidence: Evidence) -> Iterator[Finding]:
     rival = min(rivals, key=lambda trial: trial.criterion).fit
     yield Finding(
         code="structure",
-        message="This record barely distinguishes the "
-        f"{structure_in_words(name)} model from the "
+        message=f"This record barely distinguishes the {structure_in_words(name)} model from the "
         f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
-        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
-        "sweep higher, to tell.",
+        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or sweep "
+        "higher, to tell.",
         severity="info",
         parameters=PHASE_SPLIT,
     )

@@ -89,24 +89,10 @@ def bends(
 ) -> tuple[Bend, ...]:
     """Find the kinds of nonlinearity that the record does not exclude, the likeliest first.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input samples.
-    problem, fit
-        The data, weighted by their noise, and the linear fit.
-    intersample : str
-        What the input does between its samples.
-    fs : float
-        Rate in Hz.
-    floor : float
-        R.m.s. up to which an effect is ignored, in the output's unit: the error of rounding.
-
-    Returns
-    -------
-    tuple of Bend
-        Empty if the odds for the likeliest are below 400 to 1; else every kind that explains nearly
-        as much, because no trace is exact.
+    None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
+    nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
+    its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding in the
+    output's unit.
 
     Examples
     --------

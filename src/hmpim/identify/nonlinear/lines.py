@@ -7,12 +7,12 @@ T. Dobrowiecki, Automatica 41, 2005).
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Real
 from hmpim.identify.worth import MATERIAL, PART
 
 __all__ = ["LineLevel", "detection_lines", "find_period"]
@@ -90,30 +90,19 @@ def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
     within = (line >= max(excited[0], 1)) & (line <= min(excited[-1], mean_u.size - 2))
     silent = within & (mean_u < MATERIAL**2 * mean_u.max())
     signal = float(np.sqrt(np.mean(np.abs(mean_y[excited]) ** 2)))
-    parities: dict[Parity, Mask] = {
-        "even": silent & (line % 2 == 0),
-        "odd": silent & (line % 2 == 1),
-    }
-    return tuple(
-        _level(parity, mean_y[chosen], scatter[chosen], periods, signal)
-        for parity, chosen in parities.items()
-        if np.count_nonzero(chosen) >= _FEWEST
-    )
-
-
-def _level(parity: Parity, line: Complex, scatter: Real, periods: int, signal: float) -> LineLevel:
-    """Compare the part that repeats with the part that does not."""
-    count = line.size
-    noise = float(np.mean(scatter))
-    power = float(np.mean(np.abs(line) ** 2))
-    chance = 1.0 if power == 0 else 0.0
-    if noise > 0:
-        chance = float(scipy.stats.f.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
-    rms = float(np.sqrt(max(power - noise, 0.0)))
-    return LineLevel(
-        parity=parity,
-        lines=count,
-        rms=rms,
-        share=rms / signal if signal > 0 else 0.0,
-        probability=chance,
-    )
+    levels = []
+    for remainder, parity in enumerate(get_args(Parity)):
+        chosen = silent & (line % 2 == remainder)
+        count = int(np.count_nonzero(chosen))
+        if count < _FEWEST:
+            continue
+        noise = float(np.mean(scatter[chosen]))  # the part that does not repeat
+        power = float(np.mean(np.abs(mean_y[chosen]) ** 2))
+        chance = 1.0 if power == 0 else 0.0
+        if noise > 0:
+            chance = float(scipy.stats.f.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
+        rms = float(np.sqrt(max(power - noise, 0.0)))
+        share = rms / signal if signal > 0 else 0.0
+        level = LineLevel(parity=parity, lines=count, rms=rms, share=share, probability=chance)
+        levels.append(level)
+    return tuple(levels)

@@ -120,7 +120,13 @@ class Mechanism:
     trace: Real  # (n,): effect in the output, up to a factor, over the samples analysed
 
 
-def play(x: Real, half_gap: float) -> Real:
+def _reversals(x: Real) -> NDArray[np.intp]:
+    """Reversals of a signal, and its end: only there must the output of backlash be computed."""
+    way = np.sign(np.diff(x))
+    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
+
+
+def play(x: Real, half_gap: float, reversals: NDArray[np.intp] | None = None) -> Real:
     """Output of backlash: it follows `x`, (n,), half a gap behind, and waits at each reversal.
 
     Examples
@@ -128,17 +134,7 @@ def play(x: Real, half_gap: float) -> Real:
     >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
     [0.0, 0.5, 1.5, 1.5, 0.5]
     """
-    return _waiting(x, half_gap, _reversals(x))
-
-
-def _reversals(x: Real) -> NDArray[np.intp]:
-    """Reversals of a signal, and its end: only there must the output of backlash be computed."""
-    way = np.sign(np.diff(x))
-    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
-
-
-def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
-    """`play`, from known reversals: between two of them the output moves one way."""
+    turns = _reversals(x) if reversals is None else reversals
     before, now = [], float(x[0])
     for turn in x[turns].tolist():
         before.append(now)
@@ -336,10 +332,10 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
         yield Hypothesis(kind="asymmetry", trace=-quadratic)
         yield Hypothesis(kind="asymmetry", trace=quadratic)
         yield Hypothesis(kind="friction", trace=-friction)
-    turns = _reversals(x)
+    reversals = _reversals(x)
     for gap in _GAPS[every // 2 :: every]:
         half = gap * largest
-        trace = (_waiting(x, half, turns) - x) / half
+        trace = (play(x, half, reversals) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS[every // 2 :: every]:
         size = level * largest

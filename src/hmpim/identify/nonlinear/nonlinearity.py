@@ -54,23 +54,10 @@ def inspect_nonlinearity(
 ) -> Inspection:
     """Look for nonlinearity in the residual of a linear fit.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input samples.
-    problem, fit
-        The data and the linear fit.
-    fs : float
-        Rate in Hz.
-    plain : Fit, optional
-        Of a plainer structure, compared with `fit` if there is a nonlinearity: a rich structure may
-        only imitate it.
-    others : sequence of ndarray, shape (n,)
-        Other inputs that drove the output at the same time: then only harmonics are tested.
-    floor : float
-        R.m.s. up to which an effect is ignored, in the output's unit: the error of rounding.
-    unit : str
-        The output's unit, for the messages.
+    The input has shape (n,), `fs` is in Hz. If there is a nonlinearity, `fit` is compared with one
+    of a plainer structure: a rich structure may only imitate it. If other inputs, (n,), drove the
+    output at the same time, only harmonics are tested. Effects up to `floor` are ignored, the
+    r.m.s. error of rounding in the output's unit.
 
     Examples
     --------
@@ -235,17 +222,13 @@ def _summary(
     """Summarise for the result."""
     even = odd = 0.0
     curves: list[HarmonicCurve] = []
-    if outcome.harmonics is not None:
-        even, odd = (outcome.harmonics.rms(p) / output for p in (0, 1))
+    if (harmonics := outcome.harmonics) is not None:
+        even, odd = (harmonics.rms(p) / output for p in (0, 1))
         model = thinned(outcome.fit.prediction, subject.block)
-        curves = [
-            _own_amplitude(outcome.harmonics.regression.view, model, subject.fs / subject.block)
-        ]
-        for h in outcome.harmonics.orders:
-            curve = HarmonicCurve(
-                order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
-            )
-            curves.append(curve)
+        curves = [_own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)]
+        for h in harmonics.orders:
+            parts = {"frequency": h.frequency, "amplitude": h.amplitude, "std": h.std}
+            curves.append(HarmonicCurve(order=h.order, **parts))
     elif outcome.mechanisms:
         share = outcome.mechanisms[0].rms / output
         even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)

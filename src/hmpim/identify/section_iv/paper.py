@@ -162,7 +162,6 @@ def paper_analysis(
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> y = np.concatenate((np.zeros(30), u[:-30])) + 0.6
@@ -223,7 +222,6 @@ def paper_estimates(
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> paper_estimates(u, np.roll(u, 30), fs=200.0).delay
@@ -242,7 +240,6 @@ def estimates_of_many(
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> late = np.stack([np.roll(u, 30), np.roll(u, 20), np.zeros(2000)])

@@ -36,7 +36,6 @@ def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
 
     Examples
     --------
-    >>> import numpy as np
     >>> phase(np.exp(-1j * np.radians([10, 110, 210, 310, 410]))).round(6)
     array([ -10., -110., -210., -310., -410.])
     """

@@ -153,7 +153,6 @@ def transfer_function(
 
     Examples
     --------
-    >>> import numpy as np
     >>> u = np.sin(np.arange(200) ** 2 / 500)
     >>> g = transfer_function(u, -2 * u, fs=100.0)
     >>> bool(np.allclose(g.response, -2))
@@ -170,7 +169,6 @@ def ratio(y: Complex, u: Complex) -> Complex:
 
     Examples
     --------
-    >>> import numpy as np
     >>> ratio(np.array([2 + 0j, 1]), np.array([1 + 0j, 0]))
     array([ 2. +0.j, nan+nanj])
     """
@@ -190,7 +188,6 @@ def well_excited(u: Complex) -> Mask:
 
     Examples
     --------
-    >>> import numpy as np
     >>> well_excited(np.array([1.0, 1j, 0.01, -1.0, 1.0]))
     array([ True,  True, False,  True,  True])
     """
@@ -232,7 +229,6 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> low, high = excited_band(np.sin(2 * np.pi * (2 * t + 0.5 * t**2)), fs=200.0)  # 2 to 12 Hz
     >>> 1.5 < low < 2 < 12 < high < 12.7
