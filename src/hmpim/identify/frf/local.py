@@ -170,10 +170,8 @@ def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArra
 
 
 def _excited(u: Complex, centre: NDArray[np.int64]) -> Mask:
-    """Centres that are in no gap between two excited parts of the input's spectrum.
-
-    In a gap a fit would only interpolate. Hann's window removes leakage into it.
-    """
+    """Centres outside gaps of the input's spectrum, in which a fit would only interpolate."""
+    # Hann's window removes leakage into a gap.
     power = np.abs(u - 0.5 * (np.roll(u, 1) + np.roll(u, -1)))[: centre[-1] + 1] ** 2
     power[0] = 0.0  # the mean
     near = scipy.ndimage.maximum_filter1d(power, 4 * (_ORDER + 1) + 1)
@@ -198,9 +196,8 @@ def _chosen(
         return response, variance
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
-    smooth[:, inside] = spectra.u[inside] * np.stack(
-        [np.interp(inside, centre, own) for own in response]
-    )
+    between = [np.interp(inside, centre, own) for own in response]
+    smooth[:, inside] = spectra.u[inside] * np.stack(between)
     open_records = np.arange(spectra.y.shape[0])
     fits: list[LocalFit] = []
     for k, width in enumerate(rational):

@@ -298,10 +298,8 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
 
 
 def _input_condition(u: Complex, centre: Integer) -> Real:
-    """Condition number of the inputs' spectra around each centre, each scaled to unit power.
-
-    A wide window may separate inputs by distant bins only; they must differ near the centre too.
-    """
+    """Condition number of the inputs' spectra around each centre, each scaled to unit power."""
+    # A wide window may separate inputs by distant bins only; they must differ nearby too.
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (u.shape[0] + 1))
     reach = min(reach, u.shape[1] - 1)
     windows = windows_around(centre, u.shape[1], reach)
@@ -313,17 +311,14 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
 
 
 def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
-    """Transforms of the inputs, each delayed as its response is, less `base` samples.
-
-    An input is at rest before the record: its first value fills the start.
-    """
+    """Transforms of the inputs, each delayed as its response is, less `base` samples."""
     length = u.shape[1] - base
     moved = np.empty((u.shape[0], length))
     rest = np.empty(late.size)
     for j, row in enumerate(u):
         lag = int(np.floor(late[j] * fs + 1e-9)) - base
         moved[j, lag:] = row[: length - lag]
-        moved[j, :lag] = row[0]
+        moved[j, :lag] = row[0]  # an input is at rest before the record
         rest[j] = late[j] * fs - (lag + base)
     count = (length - 1) // 2 + 1
     turn = np.exp(-2j * np.pi * np.outer(rest, np.arange(count)) / length)
@@ -333,11 +328,7 @@ def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
 
 
 def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, Real, Real, Real]:
-    """Fit one output at every width, and choose at each centre.
-
-    Returned are the responses and their variances, (c, m), the condition, (c,), and the coherence,
-    (c, m + 1), of each input and of all.
-    """
+    """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1)."""
     spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
     widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
@@ -350,14 +341,11 @@ def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, R
     )
     widths = _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
     rationals = [fit for width in widths for fit in _fits(u, spectrum, centre, width, smooth)]
-    best, response, variance = choose(
-        [fit.local for fit in polynomials], [fit.local for fit in rationals]
-    )
+    local = [[fit.local for fit in fits] for fits in (polynomials, rationals)]
+    best, response, variance = choose(*local)
     tried = (*polynomials, *rationals)
-    condition, coherence = (
-        picked(np.stack([getattr(fit, name) for fit in tried]), best)[0]
-        for name in ("condition", "coherence")
-    )
+    condition = picked(np.stack([fit.condition for fit in tried]), best)[0]
+    coherence = picked(np.stack([fit.coherence for fit in tried]), best)[0]
     return response[0], variance[0], condition, coherence
 
 
@@ -409,11 +397,8 @@ def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Comple
 
 
 def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
-    """Share of the residual without an input's columns that they explain, adjusted for number.
-
-    Without them Σ|residual|² grows by θᴴ V⁻¹ θ over their own block. `total`, (w, r), is the power
-    of the outputs; the result has shape (w, r, m + 1).
-    """
+    """Share of the residual without an input's columns that they explain, (w, r, m + 1)."""
+    # Adjusted for the number of columns. Without them Σ|residual|² grows by θᴴ V⁻¹ θ of their own.
     m = own.power.shape[1]
     squares = np.maximum(found.state.squares, 1e-15 * total)
     freedom = np.maximum(own.windows.counted - found.inverse.shape[-1], 1)[:, None]

@@ -163,10 +163,7 @@ def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> C
 
 
 def _solve(solver: _Solver, way: _Way, right: Complex, power: Real, y: Complex) -> list[LocalFit]:
-    """Solve the normal equations with T or without; one fit for each width.
-
-    `right` are right sides with T, (..., w, q), and `power` is that of the output, (..., w).
-    """
+    """One fit for each width, from right sides with T, (..., w, q), and power of Y, (..., w)."""
     columns, terms = way.inverse.shape[-1], solver.here.shape[-1]
     near, right = solver.near, right[..., :columns]
     theta = (way.inverse @ right[..., None])[..., 0]

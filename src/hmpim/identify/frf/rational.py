@@ -230,10 +230,8 @@ def linear_start(columns: Columns, smooth: Complex) -> Complex:
 
 
 def _restricted(found: RationalSolution, kept: int) -> Complex:
-    """Return the solution, to first order, with only the first `kept` linear columns.
-
-    θ₁ - V₁₂ V₂₂⁻¹ θ₂ solves the least-squares problem under θ₂ = 0; V is the inverse.
-    """
+    """Return the solution, to first order, with only the first `kept` linear columns."""
+    # θ₁ - V₁₂ V₂₂⁻¹ θ₂ is the least-squares solution under θ₂ = 0.
     q = found.state.theta.shape[-1]
     out = np.arange(kept, q - DENOMINATOR_ORDER)
     stay = np.delete(np.arange(q), out)

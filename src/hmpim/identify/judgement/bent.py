@@ -29,9 +29,8 @@ def bent(evidence: Evidence) -> Iterator[Finding]:
         return
     likeliest, fs = sure[0], evidence.fs
     highest = min(evidence.band[1], fs / 2)
-    moved = evidence.moved(
-        [bent_figures(bend.fit, bend.moved, fs=fs, highest=highest) for bend in sure]
-    )
+    figures = [bent_figures(bend.fit, bend.moved, fs=fs, highest=highest) for bend in sure]
+    moved = evidence.moved(figures)
     unexplained = not likeliest.white or evidence.misfit.probability < FALSE_ALARM
     rich = evidence.joint.best.fit.structure.name not in PLAIN
     if unexplained and rich and likeliest.effect > MATERIAL:

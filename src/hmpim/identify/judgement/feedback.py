@@ -89,10 +89,7 @@ def chances_of_an_answer(u: Real, residuals: Real, counts: Mask | None = None) -
 
 @kept
 def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
-    """Eigenvalues and vectors of the future less its prediction, and the predictor from the past.
-
-    The lags at missing samples are taken out.
-    """
+    """Eigenvalues and vectors of the future less its prediction, and the predictor from the past."""
     gram = _gram(u - u.mean())
     for begin in range(0, lost.size, _AT_ONCE):
         places = lost[begin : begin + _AT_ONCE]
@@ -107,10 +104,7 @@ def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
 
 
 def _gram(u: Real) -> Real:
-    """Products of a constant and an input's lags, past first, over all samples that have them.
-
-    From lag to lag the product of two loses its first term, and gains one at its end.
-    """
+    """Products of a constant and an input's lags, past first, over all samples that have them."""
     samples = u.size - 2 * _AHEAD
     head, tail = u[: 2 * _AHEAD], u[samples:]
     gram = np.empty((2 * _AHEAD + 2, 2 * _AHEAD + 2))
@@ -118,6 +112,7 @@ def _gram(u: Real) -> Real:
     gram[0, 2:] = gram[0, 1] + np.cumsum(tail - head)
     gram[1, 1:] = np.correlate(u, u[:samples], "valid")
     gram[1:, :2] = gram[:2, 1:].T
+    # From lag to lag a product gains a term at its end, and loses its first.
     change = np.outer(tail, tail) - np.outer(head, head)
     for k in range(2, gram.shape[0]):
         gram[k, 2:] = gram[k - 1, 1:-1] + change[k - 2]

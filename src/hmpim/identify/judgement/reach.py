@@ -98,15 +98,12 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_have_moved(evidence: Evidence) -> bool:
-    """Whether the output may have moved before the record, hidden by the noise.
-
-    It would go on until the delay is over.
-    """
+    """Whether the output may have moved before the record, hidden by the noise."""
     u = evidence.u
     if not u.size or not (in_motion(u) or u[0] ** 2 > PART * float(np.mean(u**2))):
         return False
     fit = evidence.joint.best.fit
-    late = int(fit.delay)
+    late = int(fit.delay)  # for so long the motion would go on
     if late < 1:
         return True
     motion = np.mean((fit.prediction[late:] - fit.prediction[:-late]) ** 2)

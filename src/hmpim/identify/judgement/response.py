@@ -98,10 +98,7 @@ def grazed_bandwidth(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _nearest_turn(frequency: Real, height: Real, crossing: float) -> float | None:
-    """Frequency at which a curve turns above its level before its crossing, or returns after it.
-
-    None if it does neither, as a curve that always falls.
-    """
+    """Frequency at which a curve turns above its level before its crossing, or returns after it."""
     inner = height[1:-1]
     turns = np.flatnonzero((inner <= height[:-2]) & (inner < height[2:])) + 1
     before = [i for i in turns if frequency[i] < crossing]

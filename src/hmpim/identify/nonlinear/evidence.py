@@ -99,13 +99,9 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
     kinds: tuple[Mechanism, ...] = ()
     significant = bool(parts) or harmonics.regression.evidence > LIKELIER
     if significant and not subject.others and np.ptp(fit.prediction) > 0:
-        powers = np.arange(fit.denominator.size)
-        kinds = compare_harmonics(
-            harmonics.regression,
-            thinned(fit.prediction - fit.linear[-1], subject.block),
-            fit.denominator / float(subject.block) ** powers,
-            fs=rate,
-        )
+        model = thinned(fit.prediction - fit.linear[-1], subject.block)
+        denominator = fit.denominator / float(subject.block) ** np.arange(fit.denominator.size)
+        kinds = compare_harmonics(harmonics.regression, model, denominator, fs=rate)
     named = _likely(kinds, harmonics.regression.evidence)
     if not parts and not named:
         return Outcome(fit=fit, harmonics=harmonics)
@@ -127,11 +123,8 @@ def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
     least = 0.0
     if not white:  # missing dynamics resemble every kind a little, more so with few lines
         least = power * (PART if period is None else MOST)
-    found = tuple(
-        m
-        for m in compare_mechanisms(problem, fit, fs=subject.fs)
-        if m.gain > _GAIN and m.rms**2 > least
-    )
+    kinds = compare_mechanisms(problem, fit, fs=subject.fs)
+    found = tuple(m for m in kinds if m.gain > _GAIN and m.rms**2 > least)
     distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
     return Outcome(
         fit=fit,

@@ -146,13 +146,12 @@ def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
         at = np.arange(view.places + 1) * count + 2 * i
         reached = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
         spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
+        chance = scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
         found.append(
             Harmonic(
                 order=k,
                 rms=float(np.sqrt(power)),
-                probability=float(
-                    scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
-                ),
+                probability=float(chance),
                 frequency=tuple(frequency[reached].tolist()),
                 amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
                 std=tuple(np.sqrt(spread[reached]).tolist()),

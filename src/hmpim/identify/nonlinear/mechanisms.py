@@ -338,18 +338,13 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
         trace = (play(x, half, reversals) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS[every // 2 :: every]:
-        size = level * largest
-        yield Hypothesis(
-            kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.05 * largest
-        )
+        size, spacing = level * largest, 0.05 * largest
+        trace = np.clip(x, -size, size) - x
+        yield Hypothesis(kind="saturation", trace=trace, size=size, spacing=spacing)
     for rate in RATES[every // 2 :: every]:
-        size = rate * fastest
-        yield Hypothesis(
-            kind="rate_limit",
-            trace=rate_limited(x, size) - x,
-            size=size * fs,
-            spacing=0.05 * fastest * fs,
-        )
+        size, spacing = rate * fastest, 0.05 * fastest * fs
+        trace = rate_limited(x, size) - x
+        yield Hypothesis(kind="rate_limit", trace=trace, size=size * fs, spacing=spacing)
 
 
 def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) -> Mechanism | None:

@@ -161,16 +161,7 @@ def _general(
 
 
 def _particular(found: Mechanism, unit: str) -> Finding | None:
-    """Explain a kind, its size, and what to do about it; None for those without an explanation.
-
-    Examples
-    --------
-    >>> found = Mechanism(
-    ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
-    ...     effect=0.05, trace=np.zeros(0))
-    >>> _particular(found, "deg").message[:48]
-    'There is play of 0.200 ± 0.020 deg in total. Loo'
-    """
+    """Explain a kind, its size, and what to do about it; None for those without an explanation."""
     of = f" {unit}" if unit else ""
     share = f"{plus_minus(100 * found.size, 100 * found.size_std)} %"
     size = f"{plus_minus(found.size, found.size_std)}{of}"

@@ -137,10 +137,8 @@ def _least_beside(values: Real) -> Real:
 
 
 def _signs(fine: Real) -> Real:
-    """Sign of each sample; at rest, and where zero is touched but not crossed, the sign before.
-
-    So two crossings never coincide: a moving sample lies between them.
-    """
+    """Sign of each sample; at rest, and where zero is touched but not crossed, the sign before."""
+    # So two crossings never coincide: a moving sample lies between them.
     moving = np.abs(fine) > _REST * np.abs(fine).max()
     place = np.maximum.accumulate(np.where(moving, np.arange(fine.size), 0))
     place[: np.argmax(moving)] = np.argmax(moving)

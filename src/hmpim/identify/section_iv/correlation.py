@@ -154,11 +154,8 @@ def autocorrelation(x: ArrayLike) -> Correlation:
 
 
 def _peak(value: Real) -> CorrelationPeak:
-    """Peak of a correlation at lags from 0 on, since an output cannot come before its cause.
-
-    It is the highest value, as in the paper, unless the lowest is 1.2 times as far from zero: then
-    the device inverts the sign.
-    """
+    """Peak of a correlation at lags from 0 on, since an output cannot come before its cause."""
     high, low = int(np.argmax(value)), int(np.argmin(value))
+    # As in the paper the highest value, unless the lowest is so much lower: an inverted sign.
     lag = low if -value[low] > (1 + PART) * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))

@@ -14,6 +14,7 @@ from hmpim.identify.arrays import Complex, Mask, Real, median
 from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
+from hmpim.identify.section_iv import static
 from hmpim.identify.section_iv.correlation import (
     CorrelationPeak,
     autocorrelation,
@@ -27,12 +28,6 @@ from hmpim.identify.section_iv.spectrum import (
     ratio,
     spectrum,
     well_excited,
-)
-from hmpim.identify.section_iv.static import (
-    bias_by_autocorrelation,
-    noise_by_autocorrelation,
-    scale_factor_near_dc,
-    time_corrected_error,
 )
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, bins_in, check_band, check_rate, longest_lag
@@ -293,13 +288,13 @@ def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, 
 def _time_steps(u: Real, y: Real, peak: CorrelationPeak, fs: float) -> tuple[PaperEstimates, Real]:
     """Figures of sections IV.A to IV.C, equations (8) to (14), and the error of equation (9)."""
     lag = min(peak.lag, u.size - 4)
-    error = time_corrected_error(u, y, lag)
-    bias = bias_by_autocorrelation(error)
+    error = static.time_corrected_error(u, y, lag)
+    bias = static.bias_by_autocorrelation(error)
     estimates = PaperEstimates(
         delay=lag / fs,
         bias=bias,
-        scale_factor=scale_factor_near_dc(u, y, lag, bias),
-        noise_std=noise_by_autocorrelation(error),
+        scale_factor=static.scale_factor_near_dc(u, y, lag, bias),
+        noise_std=static.noise_by_autocorrelation(error),
     )
     return estimates, error
 

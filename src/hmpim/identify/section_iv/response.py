@@ -49,13 +49,7 @@ def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
 
 
 def near_dc(bins: int) -> int:
-    """Return how many of a band's bins count as near DC: the lowest twentieth, at least one.
-
-    Examples
-    --------
-    >>> near_dc(800)
-    40
-    """
+    """Return how many of a band's bins count as near DC: the lowest twentieth, at least one."""
     return max(math.ceil(FEW * bins), 1)
 
 
