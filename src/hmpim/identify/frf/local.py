@@ -82,8 +82,7 @@ def local_response(
     RecordError
         For unequal lengths, fewer than 16 samples, NaN or infinity, or a constant `u`.
     ArgumentError
-        For a rate, band, delay or number of points that cannot be, or a band without a bin of
-        the record.
+        For an impossible rate, band, delay or number of points, or a band without a bin.
 
     Notes
     -----

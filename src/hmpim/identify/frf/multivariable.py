@@ -138,10 +138,6 @@ def response_matrix(
     names : sequence of str, optional
         Of the inputs, then of the outputs; "input 0" and so on by default.
 
-    Returns
-    -------
-    ResponseMatrix
-
     Raises
     ------
     RecordError

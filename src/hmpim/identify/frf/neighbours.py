@@ -117,15 +117,15 @@ def mirrored(values: Complex, reach: int) -> Complex:
 
 
 def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float = np.inf) -> Spectra:
-    """Transform a record with its delay removed, or many of one input with almost one delay.
+    """Transform a record with its delay removed, or many outputs of one input at once.
 
     The whole samples of the delay are removed by comparing y(n + k) with u(n), so that the record
     holds every response to the stimulus; the rest is removed by its phase, and all of it if the
     input moves only in those samples. The last samples of a long record, at most one in forty, are
     omitted for a length that suits the FFT.
 
-    The output has shape (n,) or (k, n), its delays in s () or (k,); those of many outputs lie in
-    the same sample. Bins beyond the windows of a response up to `highest`, Hz, are omitted.
+    The output has shape (n,) or (k, n), its delays in s () or (k,), all in the same sample. Bins
+    beyond the windows of a response up to `highest`, Hz, are omitted.
 
     Examples
     --------

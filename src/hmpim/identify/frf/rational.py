@@ -156,19 +156,6 @@ def rational_fits(
     `own` are the regressors of `spectra.u`, and `smooth`, (r, b), is a first estimate of Y, nearly
     free of noise. With the two fits comes, for each of the r records, the greatest power of a bin
     in the residual of the fit with T, over the mean of its window.
-
-    Examples
-    --------
-    >>> from hmpim.identify.frf.neighbours import transform
-    >>> n = np.arange(400)
-    >>> u, y = np.sin(n**2 / 1000), np.zeros(400)
-    >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
-    ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
-    >>> s = transform(u, y[None], 1.0, 0.0)
-    >>> (fit, _), _ = rational_fits(s, Regressors.around(s.u, np.arange(20, 40), 16), s.y)
-    >>> z = np.exp(2j * np.pi * s.frequency[20])
-    >>> bool(abs(fit.response[0, 0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
-    True
     """
     y = own.views(spectra.y)
     fits = []

@@ -15,14 +15,13 @@ failed           a check that raises, without loss of the others
 verdict          from findings to a verdict for each parameter and for the pair
 """
 
-from hmpim.identify.judgement.checks import CHECKS, Check, judge
+from hmpim.identify.judgement.checks import CHECKS, judge
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.verdict import all_doubted, judged, judged_together, unfollowed
 
 __all__ = [
     "CHECKS",
-    "Check",
     "Evidence",
     "all_doubted",
     "attempt",

@@ -50,8 +50,7 @@ class Evidence:
     def of_other_poles(self) -> tuple[str, ...]:
         """Figures that other poles would move.
 
-        They would not move the response within the band if the residual is white or small.
-        Otherwise no figure is known.
+        If the residual is white or small, the response within the band stays the same.
         """
         described = self.readings.white or self.unexplained <= TOLERATED
         return PHASE_SPLIT if described else MODELLED

@@ -63,10 +63,10 @@ def feedback(evidence: Evidence) -> Iterator[Finding]:
 
 
 def chances_of_an_answer(u: Real, residuals: Real, counts: Mask | None = None) -> Real:
-    """Chance that a residual explains as much of the input's future without a feedback loop.
+    """Chances, without a loop, of so strong a relation of residuals to the input's future.
 
-    It is given for each of the residuals, (k, n), of outputs to the input, (n,); all samples count,
-    or those of `counts`. It is 1 if the input's past determines its future.
+    The residuals, (k, n), are of outputs to the input, (n,); all samples count, or those of
+    `counts`. The chance is 1 if the input's past determines its future.
     """
     lost = np.flatnonzero([] if counts is None else ~counts[_AHEAD:-_AHEAD])
     size, direction, predicted = _future_of(u, lost)
@@ -89,7 +89,7 @@ def chances_of_an_answer(u: Real, residuals: Real, counts: Mask | None = None) -
 
 @kept
 def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
-    """Eigenvalues and vectors of the future less its prediction, and the predictor from the past."""
+    """Eigenvalues and vectors of the unpredicted part of the future, and the predictor."""
     gram = _gram(u - u.mean())
     for begin in range(0, lost.size, _AT_ONCE):
         places = lost[begin : begin + _AT_ONCE]

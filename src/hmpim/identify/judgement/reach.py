@@ -22,7 +22,6 @@ from hmpim.record import Finding
 from hmpim.record.runs import runs_of
 
 __all__ = [
-    "InputLines",
     "beyond_band",
     "fast_mode",
     "few_lines",

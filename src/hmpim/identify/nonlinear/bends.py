@@ -155,7 +155,7 @@ def is_bent_instead(
     fs: float,
     floor: float = 0.0,
 ) -> bool:
-    """Whether a plain fit with a nonlinearity explains more than a rich fit with one or without.
+    """Whether a plain fit with one nonlinearity explains more than a rich fit, with or without one.
 
     A second mode, for instance, imitates a hardening spring. The other arguments are as for
     `bends`.

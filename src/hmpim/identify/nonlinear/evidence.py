@@ -61,9 +61,7 @@ class Outcome:
 
 
 def thinned(x: Real, block: int) -> Real:
-    """Means over blocks of samples; an incomplete one at the end is left out."""
-    if block == 1:
-        return x
+    """Means over blocks of samples; an incomplete last one is omitted."""
     return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 

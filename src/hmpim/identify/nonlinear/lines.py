@@ -25,7 +25,7 @@ _FEWEST = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineLevel:
-    """Distortion at lines of one parity: even from asymmetric nonlinearities, odd from others."""
+    """Distortion at even lines (asymmetric nonlinearities) or at odd lines (symmetric ones)."""
 
     parity: Parity
     lines: int  # their number

@@ -235,17 +235,6 @@ def compare_harmonics(
     Each trace is regressed as the residual was in `fit`, and orders 2 and up are compared. Each
     kind whose weight has the right sign is returned once; its `rms` is that of its harmonics. The
     other arguments are as for `hypotheses`.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.harmonics import sweep_harmonics
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> found = sweep_harmonics(y - u, sweep_phase(u, 100.0), 100.0)
-    >>> best = compare_harmonics(found.regression, u, np.ones(1), fs=100.0)[0]
-    >>> best.kind, round(best.size, 2)
-    ('backlash', 0.1)
     """
     tried = list(hypotheses(x, denominator, fs))
     group = fit.group(2, 2 * len(fit.orders))
@@ -348,7 +337,7 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
 
 
 def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) -> Mechanism | None:
-    """Fit one by generalised least squares; the noise's colour is that of a first residual."""
+    """Fit a hypothesis by generalised least squares, with the noise colour of a first residual."""
     h = hypothesis.trace * counted
     alone = h - (background @ h) @ background
     power = float(alone @ alone)

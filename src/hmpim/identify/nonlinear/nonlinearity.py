@@ -96,16 +96,17 @@ def inspect_nonlinearity(
     )
 
 
-def _shares(outcome: Outcome, power: float) -> tuple[float, float, float]:
+def _shares(outcome: Outcome, power: float) -> dict[str, float]:
     """Shares of the residual's power: noise, linear in the input, nonlinear."""
-    if power <= 0:
-        return 0.0, 0.0, 0.0
-    if outcome.harmonics is None:
+    noise = linear = nonlinear = 0.0
+    if outcome.harmonics is not None and power > 0:
+        harmonics = outcome.harmonics
+        parts = np.square([harmonics.noise_rms, harmonics.fundamental_rms, outcome.rms])
+        noise, linear, nonlinear = (parts / parts.sum()).tolist()
+    elif power > 0:
         nonlinear = min(outcome.rms**2 / power, 1.0)
-        return 1.0 - nonlinear, 0.0, nonlinear
-    parts = np.square([outcome.harmonics.noise_rms, outcome.harmonics.fundamental_rms, outcome.rms])
-    noise, linear, nonlinear = parts / parts.sum()
-    return float(noise), float(linear), float(nonlinear)
+        noise = 1.0 - nonlinear
+    return {"noise": noise, "linear": linear, "nonlinear": nonlinear}
 
 
 def _where(outcome: Outcome, output: float) -> list[str]:
@@ -128,10 +129,10 @@ def _where(outcome: Outcome, output: float) -> list[str]:
 
 
 def _general(
-    outcome: Outcome, output: float, shares: tuple[float, float, float], *, compared: bool
+    outcome: Outcome, output: float, shares: dict[str, float], *, compared: bool
 ) -> Finding:
     """Report a nonlinearity, its size, parity and kind; `compared` if kinds were compared."""
-    noise, linear, nonlinear = (100 * part for part in shares)
+    noise, linear, nonlinear = (100 * share for share in shares.values())
     share, effect = outcome.rms / output, outcome.effect / output
     names = [KIND_WORDS[mechanism.kind] for mechanism in outcome.named]
     if len(names) == 1:
@@ -204,7 +205,7 @@ def _particular(found: Mechanism, unit: str) -> Finding | None:
 def _summary(
     subject: Subject,
     outcome: Outcome,
-    shares: tuple[float, float, float],
+    shares: dict[str, float],
     output: float,
     *,
     unit: str,
@@ -234,17 +235,14 @@ def _summary(
             ci95=(found.size - half, found.size + half),
             unit=units.get(found.kind, ""),
         )
-    noise, linear, nonlinear = shares
     return Nonlinearity(
         share=outcome.rms / output if output else 0.0,
         even=even,
         odd=odd,
-        noise=noise,
-        linear=linear,
-        nonlinear=nonlinear,
-        kinds=tuple(m.kind for m in named),
+        kinds=tuple(mechanism.kind for mechanism in named),
         size=size,
         harmonics=tuple(curves),
+        **shares,
     )
 
 

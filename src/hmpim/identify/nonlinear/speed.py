@@ -265,7 +265,7 @@ def _lowpass() -> Real:
 
 
 def _followed(fine: Real, step: float) -> Real:
-    """What is followed at so much per fine step, low-passed, at the samples."""
+    """The command at the samples, as followed at `step` per fine step, low-passed."""
     out = rate_limited(fine, step)
     reach = min(MARGIN * _FINE, out.size - 1)
     longer = np.pad(out, reach, mode="reflect", reflect_type="odd")

@@ -43,7 +43,7 @@ class Likeness:
     is_ahead: bool
     lag: int  # samples, from 0 to the longest, at the strongest correlation without means
     there: float  # that correlation, times the number of samples
-    lead: int | None  # the same of negative lags; None unless the correlation is stronger there
+    lead: int | None  # negative lag, as far at most, with a stronger one; None if there is none
 
 
 def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:

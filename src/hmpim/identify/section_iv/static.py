@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
@@ -69,23 +68,17 @@ def initial_period(u: Real) -> int:
     101
     """
     threshold = FEW * float(np.max(np.abs(u)))
-    count = min(_BEGINNING, u.size)
-    turns = _turns(u[:count], threshold)
+    count, turns = 0, np.zeros(0, dtype=np.intp)
     while turns.size < 2 and count < u.size:
-        count = min(8 * count, u.size)
-        turns = _turns(u[:count], threshold)
+        count = min(max(8 * count, _BEGINNING), u.size)
+        beyond = np.flatnonzero(np.abs(u[:count]) > threshold)
+        turns = beyond[1:][np.diff(u[beyond] > 0.0)]  # samples that prove a crossing
     if turns.size < 2:
         return u.size
     # The crossing itself is before the sample that proves it.
     proof = int(turns[1])
     same_side = u[: proof + 1] * u[proof] > 0
     return proof - int(np.argmin(same_side[::-1])) + 1
-
-
-def _turns(excitation: Real, threshold: float) -> NDArray[np.intp]:
-    """Samples that prove that an excitation has crossed zero."""
-    beyond = np.flatnonzero(np.abs(excitation) > threshold)
-    return np.asarray(beyond[1:][np.diff(excitation[beyond] > 0.0)])
 
 
 def scale_factor_near_dc(u: Real, y: Real, lag: int, bias: float) -> float | None:
