@@ -36,11 +36,11 @@ def choose(
 
     Examples
     --------
-    >>> one = LocalFit(
+    >>> fit = LocalFit(
     ...     response=np.ones(3) + 0j, spread=np.ones(3), noise=np.ones(3), power=np.ones(3),
     ...     prediction_error=np.ones(3),
     ... )
-    >>> chosen, response, variance = choose([one, one], [])
+    >>> chosen, response, variance = choose([fit, fit], [])
     >>> chosen.tolist(), variance.tolist()
     ([0, 0, 0], [1.0, 1.0, 1.0])
     """

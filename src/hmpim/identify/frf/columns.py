@@ -74,7 +74,7 @@ class Columns:
         return np.asarray(self.linear.swapaxes(1, 2)[np.arange(place.shape[0])[:, None], place])
 
     def normal(
-        self, over: Complex | None, weight: Real, fitted: Complex, left: Complex
+        self, over: Complex | None, weight: Real, fitted: Complex, residual: Complex
     ) -> tuple[Complex, Complex]:
         """Normal equations of the columns over A, and of -fitted / A times the powers of A.
 
@@ -86,9 +86,9 @@ class Columns:
         signals = np.empty((windows, 2, *fitted.shape[1:]), dtype=np.complex128)
         np.multiply(fitted, weight, out=signals[:, 0])
         if over is None:
-            signals[:, 1] = left
+            signals[:, 1] = residual
         else:
-            np.multiply(np.conj(over), left, out=signals[:, 1])
+            np.multiply(np.conj(over), residual, out=signals[:, 1])
         moments = np.empty((windows, records, places.ends[-1]))
         ends = places.ends
         np.matmul(weight, self.products, out=moments[..., : ends[0]])

@@ -74,8 +74,7 @@ def local_response(
     -------
     FrequencyResponse
         At bins of the record inside the band, except in gaps of the input's spectrum. `std` comes
-        from the residual around each frequency and from the estimated bias. `coherence` is None:
-        there is only one segment.
+        from the residual around each frequency and from the estimated bias. `coherence` is None.
 
     Raises
     ------
@@ -128,7 +127,7 @@ def local_responses(
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> y = np.stack([2 * u, 3 * np.concatenate((np.zeros(30), u[:-30]))])
     >>> two = local_responses(u, y, 200.0, band=(0.1, 20.0), delays=np.array([0.0, 0.15]))
-    >>> [bool(np.allclose(np.abs(one.response), k)) for one, k in zip(two, (2.0, 3.0))]
+    >>> [bool(np.allclose(np.abs(frf.response), k)) for frf, k in zip(two, (2.0, 3.0))]
     [True, True]
     """
     if abs(u[-1] - u[0]) > MOST * np.ptp(u):

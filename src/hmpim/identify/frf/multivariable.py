@@ -65,8 +65,7 @@ class ResponseMatrix:
     condition : ndarray, shape (f,)
         Condition number of the inputs' spectra over a quarter of the band around, or, if that is
         larger, of the error of the responses there: 1 for inputs that have nothing in common,
-        infinite for identical ones. Each input is scaled to its own power, so units and levels do
-        not matter.
+        infinite for identical ones. Inputs are scaled to their own power.
     usable : bool ndarray, shape (f,)
         Whether the inputs can be separated.
     multiple_coherence : ndarray, shape (f, p)
@@ -281,10 +280,10 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
             f"{labels[int(np.argmin(size))]} has nothing in the band; give a band that it excites"
         )
     spectra = spectra / size[:, None]
-    left, values, _ = np.linalg.svd(spectra, full_matrices=False)
+    vectors, values, _ = np.linalg.svd(spectra, full_matrices=False)
     if values[-1] > _IDENTICAL * values[0]:
         return
-    share = np.abs(left[:, -1])
+    share = np.abs(vectors[:, -1])
     same = [label for label, s in zip(labels, share, strict=True) if s > PART * share.max()]
     raise RecordError(
         f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
@@ -413,14 +412,14 @@ def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
 def _polynomial(columns: Columns, y: Complex) -> RationalSolution:
     """Fit Y = linear columns · coefficients, A = 1, to a record of shape (w, 1, s)."""
     linear = columns.linear[:, None]
-    left = np.conj(linear)
-    inverse, theta = solved(left @ linear.swapaxes(2, 3), left @ y[..., None])
+    adjoint = np.conj(linear)
+    inverse, theta = solved(adjoint @ linear.swapaxes(2, 3), adjoint @ y[..., None])
     fitted = (theta[:, :, None] @ linear)[:, :, 0]
     state = RationalState(
         theta=theta,
         over=np.ones_like(y),
         fitted=fitted,
-        left=y - fitted,
+        residual=y - fitted,
         weight=np.ones(y.shape),
         squares=np.sum(np.abs(y - fitted) ** 2, axis=2),
     )

@@ -167,9 +167,9 @@ def _solve(solver: _Solver, way: _Way, right: Complex, power: Real, y: Complex) 
     columns, terms = way.inverse.shape[-1], solver.here.shape[-1]
     near, right = solver.near, right[..., :columns]
     theta = (way.inverse @ right[..., None])[..., 0]
-    left = power - np.vecdot(right, theta).real
+    squares = power - np.vecdot(right, theta).real
     # The difference of two nearly equal sums cannot be less than its rounding.
-    noise = np.maximum(left, 1e-15 * power) / np.maximum(way.freedom, 1)
+    noise = np.maximum(squares, 1e-15 * power) / np.maximum(way.freedom, 1)
     theta, size = theta.take(near, axis=-2), solver.size[near]
     missed = y - np.vecdot(solver.row[..., :columns], theta)
     response = np.vecdot(solver.here, theta[..., :terms]) / size

@@ -60,7 +60,7 @@ class RationalState:
     theta: Complex  # (w, r, q): coefficients of the linear columns, then of A without its 1
     over: Complex  # (w, r, s): 1 / A on the window's bins
     fitted: Complex  # (w, r, s): Y as fitted
-    left: Complex  # (w, r, s): Y - fitted
+    residual: Complex  # (w, r, s): Y - fitted
     weight: Real  # (w, r, s): 1 / |A|²
     squares: Real  # (w, r): Σ |Y - fitted|²; infinite if the iterate diverged
 
@@ -166,8 +166,8 @@ def rational_fits(
             fit, _ = read_off(own, columns, found, y)
             response, spread, power = fit.response[..., 0], fit.spread[..., 0], fit.power[..., 0]
             fits.append(replace(fit, response=response, spread=spread, power=power))
-        left = full.state.left.real**2 + full.state.left.imag**2
-        peak = np.max(left.max(axis=-1) / left.mean(axis=-1), axis=0)
+        squares = full.state.residual.real**2 + full.state.residual.imag**2
+        peak = np.max(squares.max(axis=-1) / squares.mean(axis=-1), axis=0)
     return fits, peak
 
 
@@ -209,8 +209,8 @@ def linear_start(columns: Columns, smooth: Complex) -> Complex:
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None, None]
-    >>> one = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x)
-    >>> np.abs(linear_start(one, y)).round(9).tolist()
+    >>> columns = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x)
+    >>> np.abs(linear_start(columns, y)).round(9).tolist()
     [[[2.0, 0.5, 0.0]]]
     """
     return _solution(*columns.normal(None, np.ones(smooth.shape), smooth, smooth))
@@ -237,14 +237,14 @@ def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) ->
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None, None]
-    >>> one, start = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x), np.array([[[1.9, 0.4j, 0.0]]])
-    >>> found = gauss_newton(one, y, start, steps=4)
+    >>> columns, start = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x), np.array([[[1.9, 0.4j, 0]]])
+    >>> found = gauss_newton(columns, y, start, steps=4)
     >>> np.abs(found.state.theta).round(9).tolist()
     [[[2.0, 0.5, 0.0]]]
     """
     state = _state(columns, y, theta)
     for k in range(steps):
-        gram, right = columns.normal(state.over, state.weight, state.fitted, state.left)
+        gram, right = columns.normal(state.over, state.weight, state.fitted, state.residual)
         if k < steps - 1:
             step = _solution(gram, right)
         else:
@@ -262,25 +262,25 @@ def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
     over: Complex = np.multiply(np.conj(denominator), weight, dtype=np.complex128)
     fitted = theta[..., :count] @ columns.linear
     fitted *= over
-    left = y - fitted
-    squares = np.vecdot(left, left).real
+    residual = y - fitted
+    squares = np.vecdot(residual, residual).real
     return RationalState(
         theta=theta,
         over=over,
         fitted=fitted,
-        left=left,
+        residual=residual,
         weight=weight,
         squares=np.where(np.isfinite(squares), squares, np.inf),
     )
 
 
-def _better(one: RationalState, other: RationalState) -> RationalState:
-    """Take each window from the iterate with the smaller residual; this overwrites `other`."""
-    kept = ~(other.squares < one.squares)
+def _better(old: RationalState, new: RationalState) -> RationalState:
+    """Take each window from the iterate with the smaller residual; this overwrites `new`."""
+    kept = ~(new.squares < old.squares)
     if kept.any():
         for name in (field.name for field in fields(RationalState)):
-            getattr(other, name)[kept] = getattr(one, name)[kept]
-    return other
+            getattr(new, name)[kept] = getattr(old, name)[kept]
+    return new
 
 
 def read_off(
@@ -309,7 +309,7 @@ def read_off(
     flat = moved.reshape(*own.shape[:2], -1, row.shape[-1])
     product = flat @ found.inverse  # only the real part of v V vᴴ is needed
     forms = np.vecdot(flat.view(np.float64), product.view(np.float64)).reshape(moved.shape[:-1])
-    missed = _at(found.state.left, place) / np.maximum(1.0 - forms[:, :, m], 1e-6)
+    missed = _at(found.state.residual, place) / np.maximum(1.0 - forms[:, :, m], 1e-6)
     error = missed.real**2 + missed.imag**2
     squares = np.maximum(found.state.squares, 1e-15 * np.vecdot(y, y).real)
     noise = squares / np.maximum(windows.counted - row.shape[-1], 1)[:, None]

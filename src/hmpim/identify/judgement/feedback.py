@@ -18,7 +18,6 @@ from hmpim.record import Finding
 
 __all__ = ["chances_of_an_answer", "feedback"]
 
-
 _AHEAD = 12
 """Samples of the input's future, and of its past, that are tested."""
 

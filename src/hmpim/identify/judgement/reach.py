@@ -60,8 +60,7 @@ _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidt
 def initial_transient(evidence: Evidence) -> Iterator[Finding]:
     """Say what is left out because the record does not begin at rest.
 
-    A slow free response looks like a drift: then the bias and the figures of that pole are in
-    doubt.
+    A slow free response looks like a drift: the bias and that pole's figures are then in doubt.
     """
     joint, fit = evidence.joint, evidence.joint.best.fit
     if not joint.forgotten:

@@ -250,8 +250,7 @@ def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
 def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
     """Power of an input beyond half the rate, at the frequencies to which it is aliased.
 
-    The slope of its spectrum over the last octave gives it; 0 if there is none. Only one of `every`
-    bins is returned.
+    The slope of its spectrum over the last octave gives it. One of `every` bins is returned.
     """
     bins = np.arange(1, u.size // 2 + 1, every)
     lines = lines_of(u)

@@ -91,8 +91,7 @@ def bends(
 
     None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
     nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
-    its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding in the
-    output's unit.
+    its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding.
 
     Examples
     --------
@@ -157,8 +156,7 @@ def is_bent_instead(
 ) -> bool:
     """Whether a plain fit with one nonlinearity explains more than a rich fit, with or without one.
 
-    A second mode, for instance, imitates a hardening spring. The other arguments are as for
-    `bends`.
+    A second mode may imitate a hardening spring. The other arguments are as for `bends`.
     """
     if fit.cost < PART * plain.cost:  # no kind explains as much
         return False

@@ -1,7 +1,7 @@
 """Harmonics of a sweep by regression: amplitudes that change slowly along it, in coloured noise.
 
-A residual is regressed on cos kφ and sin kφ, where φ is the sweep's phase when the input left, and
-on a mean. Each has a weight that is linear between about ten places along the sweep. An
+A residual is regressed on cos kφ and sin kφ, where φ is the sweep's phase when the input was sent,
+and on a mean. Each has a weight that is linear between about ten places along the sweep. An
 autoregression first whitens both sides.
 """
 
@@ -39,7 +39,7 @@ _FEWEST = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SweepView:
-    """Samples during the sweep that count, and the sweep's phase when their input left."""
+    """Samples during the sweep that count, and the sweep's phase when their input was sent."""
 
     index: NDArray[np.intp]  # (m,): which samples
     phase: Real  # (m,): radians
@@ -56,8 +56,8 @@ def _phase_at(sweep: SweepPhase, index: NDArray[np.intp], late: float) -> Real:
 def view_of(e: Real, sweep: SweepPhase, fs: float, delay: float) -> SweepView | None:
     """The stretch to analyse; None if it is too short, or no order lies below Nyquist."""
     late = delay * fs
-    left = np.arange(e.size) - int(np.rint(late))  # a whole sample is exact enough here
-    inside = sweep.inside[np.clip(left, 0, e.size - 1)] & (left >= 0) & (left < e.size)
+    sent = np.arange(e.size) - int(np.rint(late))  # a whole sample is exact enough here
+    inside = sweep.inside[np.clip(sent, 0, e.size - 1)] & (sent >= 0) & (sent < e.size)
     index = np.flatnonzero(inside & (e != 0.0))
     if index.size < _FEWEST:
         return None
@@ -167,14 +167,14 @@ def fit_harmonics(
     e = e[view.index]
     weights, _, _ = _solved(_gram(columns, view), _moments(e[None], columns, view)[0])
     count = columns.shape[0]
-    left = e - _expanded(columns, weights.reshape(-1, count), view)
-    whitening, _ = yule_walker(left, _LONGEST_AUTOREGRESSION)
+    residual = e - _expanded(columns, weights.reshape(-1, count), view)
+    whitening, _ = yule_walker(residual, _LONGEST_AUTOREGRESSION)
     white_e = scipy.signal.lfilter(whitening, [1.0], e)
     white = scipy.signal.lfilter(whitening, [1.0], columns, axis=1)
     weights, covariance, used = _solved(_gram(white, view), _moments(white_e[None], white, view)[0])
-    left = white_e - _expanded(white, weights.reshape(-1, count), view)
+    residual = white_e - _expanded(white, weights.reshape(-1, count), view)
     freedom = max(e.size - int(np.count_nonzero(used)) - whitening.size + 1, 1)
-    variance = max(float(left @ left) / freedom, 1e-300)
+    variance = max(float(residual @ residual) / freedom, 1e-300)
     return HarmonicFit(
         view=view,
         columns=columns,

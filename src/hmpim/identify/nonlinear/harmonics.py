@@ -93,8 +93,7 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
     """Chances that noise alone makes the harmonics of white residuals, (k, n): a quick test.
 
     It takes a tenth of the work of `sweep_harmonics`, and holds only for white residuals. The delay
-    in s is rounded to a sample: this turns all harmonics of a stretch by the same angle, and only
-    their size counts.
+    in s is rounded to a sample, which turns the harmonics of a stretch but keeps their size.
 
     Examples
     --------

@@ -344,8 +344,8 @@ def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) ->
     if power <= 1e-10 * float(h @ h):
         return None
     weight = max(float(alone @ e) / power, 0.0)
-    left = e - (background @ e) @ background - weight * alone
-    colour, _ = yule_walker(left[counted], LONGEST_AUTOREGRESSION)
+    residual = e - (background @ e) @ background - weight * alone
+    colour, _ = yule_walker(residual[counted], LONGEST_AUTOREGRESSION)
     # Samples that do not count are skipped: the others keep their linear relation.
     rows = scipy.signal.lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
     white = scipy.signal.lfilter(colour, [1.0], e[counted])

@@ -147,14 +147,14 @@ def _general(
         guess += f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
     where = _where(outcome, output)
     at = f": {' and '.join(where)}" if where else ""
-    left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
+    split = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
     if outcome.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
-        left += " or dynamics left out"
+        split += " or dynamics left out"
     elif linear >= 0.5:
-        left += f"; {linear:.0f} % still follows the input"
+        split += f"; {linear:.0f} % still follows the input"
     return Finding(
         code="nonlinear",
-        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {left}. "
+        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {split}. "
         "Identify at several amplitudes to see where the linear model holds.",
         severity="doubt" if outcome.effect > MATERIAL * output else "info",
         parameters=MODELLED,

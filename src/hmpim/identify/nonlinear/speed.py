@@ -111,14 +111,12 @@ def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> boo
 
 def _log_odds(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> float:
     count = limited.counted
-    one, other = (
-        yule_walker(p.masked(f.residual), LONGEST_AUTOREGRESSION)[1]
-        for p, f in ((limited, fit), (linear, best))
-    )
-    if one <= 0.0 or other <= 0.0:
+    with_limit = yule_walker(limited.masked(fit.residual), LONGEST_AUTOREGRESSION)[1]
+    without = yule_walker(linear.masked(best.residual), LONGEST_AUTOREGRESSION)[1]
+    if with_limit <= 0.0 or without <= 0.0:
         return -np.inf
     extra = fit.structure.parameters + 1 - best.structure.parameters
-    return 0.5 * float(count * np.log(other / one) - extra * np.log(count))
+    return 0.5 * float(count * np.log(without / with_limit) - extra * np.log(count))
 
 
 def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
@@ -234,8 +232,7 @@ def _profiled(
 def beside_speed(joint: JointFit, slope: Real) -> JointFit:
     """The joint fit with the speed as one more free parameter, so that error bars include it.
 
-    The joint fit is to the command as it is followed; `slope`, (n,), is the derivative of the
-    output by the speed.
+    It fits the followed command; `slope`, (n,), is the derivative of the output by the speed.
     """
     problem = _with_row(joint.problem, slope)
     weighed = replace(joint.weighed, nuisance=problem.nuisance)

@@ -43,8 +43,7 @@ class SweepPhase:
 def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
     """Find the phase of an input, (n,), at a rate in Hz, if it is a single sinusoid.
 
-    Its frequency and its amplitude may vary. None for any other input: several sines, noise, steps,
-    a binary sequence.
+    Frequency and amplitude may vary. None for several sines, noise, steps, a binary sequence.
 
     Examples
     --------

@@ -24,8 +24,7 @@ def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
     Parameters
     ----------
     response : array_like of complex, shape (..., m)
-        G(jω) inside the excited band, frequency increasing, all finite; of many devices along axes
-        before the last.
+        G(jω) inside the excited band, frequency increasing, finite; many devices along other axes.
     inverted : array_like of bool, shape (...)
         True for a device that inverts the sign: the phase is then that of -G.
 

@@ -40,8 +40,7 @@ def bias_by_autocorrelation(error: Real) -> float:
 
     K_C = √R(0), with R the autocorrelation (10) of the time-corrected error (9), shape (n,). This
     is the bias only if the error contains nothing else; noise and the dynamics add to it (0.68 for
-    the true 0.6 of the paper's Fig. 17). The sign is that of the mean of measurement minus truth,
-    as in Fig. 10.
+    the true 0.6 of the paper's Fig. 17). The sign is that of the mean of measurement minus truth.
 
     Examples
     --------
