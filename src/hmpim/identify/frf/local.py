@@ -1,8 +1,8 @@
 """The frequency response from one record, by local fits, with its error at each frequency.
 
-Around each frequency a polynomial or a rational function is fitted over neighbouring bins of
-the transform. Which of them, and over how many neighbours, the data choose by how well each
-predicts a bin from its neighbours alone.
+Around each frequency a polynomial or a rational function is fitted over neighbouring bins of the
+transform. Cross-validation chooses between them, and how many neighbours they use: it measures how
+well each predicts a bin from its neighbours alone.
 """
 
 from collections.abc import Callable
@@ -13,16 +13,10 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.arrays import Complex, Real
+from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import searched
 from hmpim.identify.frf.choice import choose
-from hmpim.identify.frf.neighbours import (
-    WIDEST,
-    LocalFit,
-    Spectra,
-    centres_in_band,
-    transform,
-)
+from hmpim.identify.frf.neighbours import WIDEST, LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
 from hmpim.identify.kept import keeping
@@ -34,14 +28,14 @@ __all__ = ["local_response", "local_responses"]
 
 _FEWEST_SAMPLES = 16
 _ORDER = 2
-# Each window of polynomials is wider than the last by this.
+# Ratio of the widths of successive windows of polynomials.
 _RATIO = 2.0
-# Narrower windows are too short for eight coefficients beside noise.
+# Narrower windows are too short for eight coefficients in noise.
 _NARROWEST_RATIONAL = 20
-# Bins in all windows of one width of rational functions, beyond which they cost too much; a
-# record so long has neighbours enough for polynomials.
+# Bins in all windows of one width of rational functions, beyond which they cost too much. So long
+# a record has enough neighbours for polynomials.
 _AFFORDABLE = 60_000
-# Records of one input that are fitted at once: as many as a processor's cache holds.
+# Records of one input that are fitted at once: they fit into a processor's cache.
 _AT_ONCE = 32
 
 
@@ -56,12 +50,12 @@ def local_response(
 ) -> FrequencyResponse:
     """Return the frequency response by local polynomials and local rational functions.
 
-    At each frequency the data choose between them, with a transient or without, and among
-    widths (cross-validation, averaged over 61 frequencies, weighed against the variance of G).
-    Windows of half the band and a quarter are always tried, narrower ones where these fall short.
-    The delay is taken out first and put back at the end; the bias lies in the bin at DC, which
-    is not used. Where an input ends elsewhere than it began, as a step or a ramp does, that jump
-    leaks into every bin: both are differenced, which leaves their ratio what it is.
+    Cross-validation, averaged over 61 frequencies and weighed against the variance of G, chooses
+    at each frequency between them, with a transient or without, and among widths. Windows of half
+    the band and a quarter are always tried, narrower ones if these do not suffice. The delay is
+    removed first and restored at the end; the bias is in the bin at DC, which is not used. If an
+    input ends at another value than it began, as a step or a ramp does, that jump leaks into every
+    bin: then both signals are differenced, which does not change their ratio.
 
     Parameters
     ----------
@@ -72,30 +66,27 @@ def local_response(
     band : tuple of float
         Excited band, Hz.
     delay : float
-        Pure delay in s, as well as it is known; it need not be exact.
+        Pure delay in s; it need not be exact.
     points : int
         Greatest number of frequencies; beyond it they are spaced by a constant ratio.
 
     Returns
     -------
     FrequencyResponse
-        At bins of the record inside the band, without gaps that the input leaves in its
-        spectrum. `std` is from the residual around each frequency
-        and, where the chosen fit predicts worse than the best, from what it lacks. `coherence`
-        is None: there is one segment only.
+        At bins of the record inside the band, except in gaps of the input's spectrum. `std` comes
+        from the residual around each frequency and from the estimated bias. `coherence` is None.
 
     Raises
     ------
     RecordError
         For unequal lengths, fewer than 16 samples, NaN or infinity, or a constant `u`.
     ArgumentError
-        For a rate, band, delay or number of points that cannot be, or a band without a bin of
-        the record.
+        For an impossible rate, band, delay or number of points, or a band without a bin.
 
     Notes
     -----
     Both are estimates of Pintelon and Schoukens, System Identification, 2nd ed., ch. 7; see
-    `hmpim.identify.frf.rational` for where the rational one departs from McKelvey and Guerin.
+    `hmpim.identify.frf.rational` for how the rational one differs from McKelvey and Guerin.
 
     Examples
     --------
@@ -117,25 +108,18 @@ def local_response(
         raise ArgumentError(f"points is {points}; give at least 1")
     if np.ptp(first) == 0:
         raise RecordError(f"u is constant at {first[0]:g}; an input must move")
-    late = np.array([delay])
-    (told,) = local_responses(first, second[None], fs, delays=late, band=band, points=points)
-    return told
+    delays = np.array([delay])
+    return local_responses(first, second[None], fs, delays=delays, band=band, points=points)[0]
 
 
 @keeping()
 def local_responses(
-    u: Real,
-    outputs: Real,
-    fs: float,
-    *,
-    band: tuple[float, float],
-    delays: Real,
-    points: int = 400,
+    u: Real, outputs: Real, fs: float, *, band: tuple[float, float], delays: Real, points: int = 400
 ) -> list[FrequencyResponse]:
     """Return the responses of many outputs to one input, each as `local_response` finds it.
 
-    What follows from the input alone is made once, and the fits are made of many records at once.
-    Outputs have shape (k, n), one a row, and pure delays in s (k,).
+    The outputs, (k, n), have pure delays in s, (k,). All that depends on the input alone is
+    computed once, and many records are fitted at once.
 
     Examples
     --------
@@ -143,7 +127,7 @@ def local_responses(
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> y = np.stack([2 * u, 3 * np.concatenate((np.zeros(30), u[:-30]))])
     >>> two = local_responses(u, y, 200.0, band=(0.1, 20.0), delays=np.array([0.0, 0.15]))
-    >>> [bool(np.allclose(np.abs(one.response), k)) for one, k in zip(two, (2.0, 3.0))]
+    >>> [bool(np.allclose(np.abs(frf.response), k)) for frf, k in zip(two, (2.0, 3.0))]
     [True, True]
     """
     if abs(u[-1] - u[0]) > MOST * np.ptp(u):
@@ -164,9 +148,9 @@ def local_responses(
             response, variance = _chosen(spectra, centre, regressors)
             frequency = spectra.frequency[centre]
             response = response * np.exp(-2j * np.pi * frequency * delays[some, None])
-            for i, one, own in zip(some.tolist(), response, np.sqrt(variance), strict=True):
+            for i, each, std in zip(some.tolist(), response, np.sqrt(variance), strict=True):
                 found[i] = FrequencyResponse(
-                    frequency=frequency, response=one, std=own, coherence=None
+                    frequency=frequency, response=each, std=std, coherence=None
                 )
     return [found[i] for i in range(outputs.shape[0])]
 
@@ -183,12 +167,9 @@ def _centres(spectra: Spectra, band: tuple[float, float], points: int) -> NDArra
     return centre[_excited(spectra.u, centre)]
 
 
-def _excited(u: NDArray[np.complex128], centre: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Where the input moves within the narrowest window, or on one side of it not at all.
-
-    Between two parts of the spectrum with nothing in between, a fit would tell only how it
-    bridges them. What leaks into the gap, Hann's window takes away.
-    """
+def _excited(u: Complex, centre: NDArray[np.int64]) -> Mask:
+    """Centres outside gaps of the input's spectrum, in which a fit would only interpolate."""
+    # Hann's window removes leakage into a gap.
     power = np.abs(u - 0.5 * (np.roll(u, 1) + np.roll(u, -1)))[: centre[-1] + 1] ** 2
     power[0] = 0.0  # the mean
     near = scipy.ndimage.maximum_filter1d(power, 4 * (_ORDER + 1) + 1)
@@ -201,10 +182,10 @@ def _chosen(
 ) -> tuple[Complex, Real]:
     """Response and variance at each centre, of each record.
 
-    Polynomials come first; what they predict starts the rational functions, which are fitted over
-    the two widest windows. Narrower ones follow, in turn, for a record that takes the narrowest so
-    far, or polynomials narrower than the next, at many frequencies, or that leaves a bin which is
-    no chance: the power of noise is exponentially distributed.
+    The polynomials give the start of the rational functions, which are fitted over the two widest
+    windows. Narrower windows follow, one by one, for records that do not suffice with these: the
+    narrowest so far, or a polynomial narrower than the next, is chosen at many frequencies, or a
+    bin of the residual exceeds the noise, whose power has an exponential distribution.
     """
     widths, polynomials = _polynomials(spectra, centre)
     _, response, variance = choose(polynomials, ())
@@ -213,18 +194,17 @@ def _chosen(
         return response, variance
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
-    smooth[:, inside] = spectra.u[inside] * np.stack(
-        [np.interp(inside, centre, own) for own in response]
-    )
-    asking, y = np.arange(spectra.y.shape[0]), spectra.y
+    between = [np.interp(inside, centre, own) for own in response]
+    smooth[:, inside] = spectra.u[inside] * np.stack(between)
+    open_records = np.arange(spectra.y.shape[0])
     fits: list[LocalFit] = []
     for k, width in enumerate(rational):
-        some = Spectra(frequency=spectra.frequency, u=spectra.u, y=y[asking])
-        own, peak = rational_fits(some, regressors(width), smooth[asking])
+        some = Spectra(frequency=spectra.frequency, u=spectra.u, y=spectra.y[open_records])
+        own, peak = rational_fits(some, regressors(width), smooth[open_records])
         fits = own + fits
         if k == 0 and len(rational) > 1:
-            continue  # the widest is judged by the next
-        chosen, response[asking], variance[asking] = choose(polynomials, fits)
+            continue  # the next width decides about the widest
+        chosen, response[open_records], variance[open_records] = choose(polynomials, fits)
         if k + 1 == len(rational):
             break
         below = 2 * sum(w < rational[k + 1] for w in widths)
@@ -233,7 +213,7 @@ def _chosen(
         more = (narrow.mean(axis=-1) > PART) | (peak > searched(spectra.u.size))
         if not more.any():
             break
-        asking = asking[more]
+        open_records = open_records[more]
         polynomials, fits = ([fit.of(more) for fit in kind] for kind in (polynomials, fits))
     return response, variance
 
@@ -241,19 +221,19 @@ def _chosen(
 def _polynomials(spectra: Spectra, centre: NDArray[np.int64]) -> tuple[list[int], list[LocalFit]]:
     """Widths, and two fits of each."""
     bins = spectra.u.size - 1
-    # Each polynomial has order + 1 coefficients, and residuals must be left over.
+    # Each polynomial has order + 1 coefficients; the window must hold more bins than coefficients.
     order = min(_ORDER, max((bins - 2) // 4 - 1, 0))
     least = 2 * (order + 1)
     top = min(max(int(centre[-1] - centre[0] + 1) // 3, least + 1), WIDEST)
     count = max(int(np.ceil(np.log(top / least) / np.log(_RATIO))), 1)
-    widths = tuple(int(w) for w in np.rint(np.geomspace(least, top, count + 1)))
     most = max((bins - 1) // 2, 1)
-    each = sorted({min(max(w, order + 1), most) for w in widths})
+    widths = np.rint(np.geomspace(least, top, count + 1))
+    each = sorted({min(max(int(width), order + 1), most) for width in widths})
     return each, polynomial_fits(spectra, centre, tuple(each), order)
 
 
 def _rational_widths(centre: NDArray[np.int64], bins: int) -> list[int]:
-    """Return half the band, a quarter, and so on, as far as each can be paid for."""
+    """Return half the band, a quarter, and so on, if each is affordable."""
     widths = []
     span = int(centre[-1] - centre[0] + 1)
     width = min(span // 2, (bins - 1) // 2)

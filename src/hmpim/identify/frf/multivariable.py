@@ -3,9 +3,9 @@
 Around each frequency Y_i = Σ_j G_ij U_j + T_i over neighbouring bins, all inputs together, by
 local polynomials and by local rational functions with one denominator for each output:
 Pintelon and Schoukens, System Identification, 2nd ed., Wiley 2012, section 7.3; R. Voorhoeve,
-A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a
-frequency at different times turn their phases differently from bin to bin there, and that is
-what tells them apart. Where they do not, the answer is refused.
+A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a frequency at
+different times turn their phases differently from bin to bin there, which separates their
+responses. Without this difference no response is given.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.columns import Columns
-from hmpim.identify.frf.neighbours import (
-    LocalFit,
-    centres_in_band,
-    mirrored,
-    windows_around,
-)
+from hmpim.identify.frf.neighbours import LocalFit, centres_in_band, mirrored, windows_around
 from hmpim.identify.frf.rational import (
     NUMERATOR,
     TRANSIENT_ORDER,
@@ -41,17 +36,15 @@ from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
-_ORDER = 2  # of T beside polynomials
+_ORDER = 2  # of T in polynomial fits
 _TERMS = NUMERATOR + 1
-# Power of U, relative to its greatest, that counts as none.
-_NOTHING = 1e-24
-# Inputs whose normalised spectra depend on one another to this, over the whole band.
+# Least singular value, over the greatest, of normalised spectra of different inputs.
 _IDENTICAL = 1e-6
 _RATIO = 1.6
 _STEPS = 3
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
-# Samples of an output that must be valid.
+# Fewest valid samples of an output.
 _FEWEST = 16
 
 Integer = NDArray[np.int64]
@@ -70,17 +63,16 @@ class ResponseMatrix:
     std : ndarray, shape (f, p, m)
         √E|error|²; NaN where not `usable`.
     condition : ndarray, shape (f,)
-        Condition number of the inputs' spectra over a quarter of the band around, or, if that
-        is more, of the error of the responses there: 1 for inputs that have nothing in common,
-        infinite for one and the same. Each input counts with its own power, so units and
-        levels do not matter.
+        Condition number of the inputs' spectra over a quarter of the band around, or, if that is
+        larger, of the error of the responses there: 1 for inputs that have nothing in common,
+        infinite for identical ones. Inputs are scaled to their own power.
     usable : bool ndarray, shape (f,)
-        Whether the inputs can be told apart.
+        Whether the inputs can be separated.
     multiple_coherence : ndarray, shape (f, p)
-        Share of the output's power in the window that all inputs together explain, less what
-        as many coefficients explain of noise.
+        Share of the output's power in the window that all inputs together explain, less the share
+        of noise that as many coefficients explain.
     partial_coherence : ndarray, shape (f, p, m)
-        Share that one input explains of what the others leave over, likewise.
+        Share that one input explains of the residual of the others, likewise.
     inputs, outputs : tuple of str
         Names.
     """
@@ -98,14 +90,11 @@ class ResponseMatrix:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Joint:
-    """All inputs to one output by one method at one width.
+    """All inputs to one output by one method at one width."""
 
-    `local` holds arrays of shape (1, c, m); `condition` is (1, c); `coherence` (1, c, m + 1).
-    """
-
-    local: LocalFit
-    condition: Real
-    coherence: Real
+    local: LocalFit  # of shape (1, c, m)
+    condition: Real  # (1, c)
+    coherence: Real  # (1, c, m + 1)
 
 
 def response_matrix(
@@ -132,34 +121,29 @@ def response_matrix(
     fs : float
         Sampling rate, Hz.
     delays : array_like, shape (p, m), (p, 1) or ()
-        Pure delays in s, output over input, not negative; rough values will do.
+        Pure delays in s, output over input, not negative; rough values suffice.
     band : tuple of float
-        Band in which every input has something, Hz.
+        Band that every input excites, Hz.
     valid : array_like of bool, shape (p, n) or (n,), optional
-        False where an output is missing; all of it valid by default.
+        False where an output is missing; all samples are valid by default.
     fill : array_like, shape (p, n), optional
-        What a model predicts of the outputs, bias included, used where they are missing. A
-        smooth curve through the neighbours by default, which serves for gaps short beside a
-        period.
+        A model's prediction of the outputs, bias included, used where they are missing. By default
+        a smooth curve through the neighbours, for gaps that are short compared with a period.
     worst_condition : float
-        Greatest condition number at which inputs still count as told apart, above 1. At 10 the
-        error of the worst combination of inputs is ten times that of the best.
+        Greatest condition number at which inputs count as separated, above 1. At 10 the error of
+        the worst combination of inputs is ten times that of the best.
     points : int
         Greatest number of frequencies; beyond it they are spaced by a constant ratio.
     names : sequence of str, optional
         Of the inputs, then of the outputs; "input 0" and so on by default.
 
-    Returns
-    -------
-    ResponseMatrix
-
     Raises
     ------
     RecordError
-        For shapes that do not fit, NaN, a constant input, or inputs that are the same over the
-        whole band but for a factor, or sums of others: they are named.
+        For shapes that do not fit, NaN, a constant input, or inputs that are multiples or sums of
+        others over the whole band: they are named.
     ArgumentError
-        For a rate, band, delay, bound or names that cannot be.
+        For an impossible rate, band, delay, bound or names.
 
     Examples
     --------
@@ -181,7 +165,11 @@ def response_matrix(
         )
     check_rate(fs)
     check_band(band, fs)
-    labels_u, labels_y = _checked_names(names, m, p)
+    numbered = [*(f"input {k}" for k in range(m)), *(f"output {k}" for k in range(p))]
+    labels = tuple(numbered if names is None else names)
+    if len(labels) != m + p:
+        raise ArgumentError(f"names holds {len(labels)}; give {m} of inputs and {p} of outputs")
+    labels_u, labels_y = labels[:m], labels[m:]
     late = _checked_delays(delays, p, m, u.shape[1] / fs)
     if not worst_condition > 1:
         raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
@@ -211,7 +199,7 @@ def response_matrix(
     condition = np.maximum(inputs_alone, conditions.max(axis=1))
     usable = condition <= worst_condition
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
-    # What is filled in has no residual and says nothing new: both raise the error.
+    # Filled samples have no residual and add no information: both raise the error.
     std = np.sqrt(variance) / share[:, None]
     response[~usable] = complex(np.nan, np.nan)
     std[~usable] = np.nan
@@ -231,10 +219,7 @@ def response_matrix(
 def _filled(
     y: Real, valid: ArrayLike | None, fill: ArrayLike | None, labels: tuple[str, ...]
 ) -> tuple[Real, Real]:
-    """Outputs without gaps, (p, n), and the share of each that was measured, (p,).
-
-    Gaps are filled by a model where there is one, or by a curve through the neighbours.
-    """
+    """Outputs with their gaps filled, (p, n), and the share of each that was measured, (p,)."""
     if valid is None:
         return y, np.ones(y.shape[0])
     mask = np.asarray(valid)
@@ -248,16 +233,16 @@ def _filled(
     if given is not None and given.shape != y.shape:
         raise RecordError(f"fill has shape {given.shape} and outputs {y.shape}; give as many")
     out = y.copy()
-    for i, (row, told, label) in enumerate(zip(out, mask, labels, strict=True)):
-        if np.count_nonzero(told) < _FEWEST:
+    for i, (row, counts, label) in enumerate(zip(out, mask, labels, strict=True)):
+        measured, gaps = np.flatnonzero(counts), np.flatnonzero(~counts)
+        if measured.size < _FEWEST:
             raise RecordError(
-                f"{label} has {np.count_nonzero(told)} valid samples; at least {_FEWEST} are needed"
+                f"{label} has {measured.size} valid samples; at least {_FEWEST} are needed"
             )
-        gaps = np.flatnonzero(~told)
-        if gaps.size and given is None:
-            row[gaps] = scipy.interpolate.PchipInterpolator(np.flatnonzero(told), row[told])(gaps)
-        elif given is not None:
+        if given is not None:
             row[gaps] = given[i, gaps]
+        elif gaps.size:
+            row[gaps] = scipy.interpolate.PchipInterpolator(measured, row[measured])(gaps)
     return out, np.asarray(mask.mean(axis=1))
 
 
@@ -270,17 +255,6 @@ def _checked_signals(name: str, values: ArrayLike) -> Real:
     return array
 
 
-def _checked_names(
-    names: Sequence[str] | None, m: int, p: int
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    if names is None:
-        return tuple(f"input {k}" for k in range(m)), tuple(f"output {k}" for k in range(p))
-    given = tuple(names)
-    if len(given) != m + p:
-        raise ArgumentError(f"names holds {len(given)}; give {m} of inputs and {p} of outputs")
-    return given[:m], given[m:]
-
-
 def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
     late = np.asarray(delays, dtype=np.float64)
     try:
@@ -289,16 +263,16 @@ def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
         raise ArgumentError(
             f"delays has shape {late.shape}; give ({p}, {m}), output over input"
         ) from None
-    if not np.all((late >= 0) & (late < length / 2)):
+    wrong = late[~((late >= 0) & (late < length / 2))]
+    if wrong.size:
         raise ArgumentError(
-            f"delays holds {late[~((late >= 0) & (late < length / 2))][0]} s; give 0 or more, "
-            "and less than half the record"
+            f"delays holds {wrong[0]} s; give 0 or more, and less than half the record"
         )
     return np.asarray(late)
 
 
 def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
-    """Name the inputs that are one and the same over the band, or sums of others."""
+    """Refuse inputs that are multiples or sums of others over the band, and name them."""
     spectra = scipy.fft.rfft(u, axis=1)[:, low : high + 1]
     size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=1))
     if np.any(size == 0):
@@ -306,10 +280,10 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
             f"{labels[int(np.argmin(size))]} has nothing in the band; give a band that it excites"
         )
     spectra = spectra / size[:, None]
-    left, values, _ = np.linalg.svd(spectra, full_matrices=False)
+    vectors, values, _ = np.linalg.svd(spectra, full_matrices=False)
     if values[-1] > _IDENTICAL * values[0]:
         return
-    share = np.abs(left[:, -1])
+    share = np.abs(vectors[:, -1])
     same = [label for label, s in zip(labels, share, strict=True) if s > PART * share.max()]
     raise RecordError(
         f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
@@ -319,10 +293,8 @@ def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> 
 
 
 def _input_condition(u: Complex, centre: Integer) -> Real:
-    """Condition number of the inputs' spectra around each centre, each of unit power.
-
-    A wide window may tell inputs apart by what it sees far off; that much near by is asked for.
-    """
+    """Condition number of the inputs' spectra around each centre, each scaled to unit power."""
+    # A wide window may separate inputs by distant bins only; they must differ nearby too.
     reach = max(int(centre[-1] - centre[0] + 1) // 8, 4 * (u.shape[0] + 1))
     reach = min(reach, u.shape[1] - 1)
     windows = windows_around(centre, u.shape[1], reach)
@@ -334,17 +306,14 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
 
 
 def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
-    """Transforms of the inputs, each delayed as its response is, less `base` samples.
-
-    At rest before the record nothing is lost: what moves in is the first value, held.
-    """
+    """Transforms of the inputs, each delayed as its response is, less `base` samples."""
     length = u.shape[1] - base
     moved = np.empty((u.shape[0], length))
     rest = np.empty(late.size)
     for j, row in enumerate(u):
         lag = int(np.floor(late[j] * fs + 1e-9)) - base
         moved[j, lag:] = row[: length - lag]
-        moved[j, :lag] = row[0]
+        moved[j, :lag] = row[0]  # an input is at rest before the record
         rest[j] = late[j] * fs - (lag + base)
     count = (length - 1) // 2 + 1
     turn = np.exp(-2j * np.pi * np.outer(rest, np.arange(count)) / length)
@@ -354,42 +323,29 @@ def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
 
 
 def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, Real, Real, Real]:
-    """Fit one output at every width, and choose at each centre.
-
-    Returned are the responses and their variances, (c, m), the condition, (c,), and the coherence,
-    (c, m + 1), of each input and, last, of all.
-    """
+    """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1)."""
     spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
     spectrum[0] = 0.0
-    polynomials = [
-        fit
-        for width in _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
-        for fit in _fits(u, spectrum, centre, width, None)
-    ]
+    widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
+    polynomials = [fit for width in widths for fit in _fits(u, spectrum, centre, width, None)]
     _, (g,), _ = choose([fit.local for fit in polynomials], [])
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectrum.copy()
     smooth[inside] = sum(
         u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
     )
-    rationals = [
-        fit
-        for width in _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
-        for fit in _fits(u, spectrum, centre, width, smooth)
-    ]
-    best, response, variance = choose(
-        [fit.local for fit in polynomials], [fit.local for fit in rationals]
-    )
+    widths = _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
+    rationals = [fit for width in widths for fit in _fits(u, spectrum, centre, width, smooth)]
+    local = [[fit.local for fit in fits] for fits in (polynomials, rationals)]
+    best, response, variance = choose(*local)
     tried = (*polynomials, *rationals)
-    condition, coherence = (
-        picked(np.stack([getattr(fit, name) for fit in tried]), best)[0]
-        for name in ("condition", "coherence")
-    )
+    condition = picked(np.stack([fit.condition for fit in tried]), best)[0]
+    coherence = picked(np.stack([fit.coherence for fit in tried]), best)[0]
     return response[0], variance[0], condition, coherence
 
 
 def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tuple[int, ...]:
-    """Return half the band, and less by a constant ratio, as far as each can be paid for."""
+    """Return half the band, and less by a constant ratio, if each is affordable."""
     span = int(centre[-1] - centre[0] + 1)
     top = min(span // 2, (u.shape[1] - 2) // 2)
     widths = {top}
@@ -402,25 +358,25 @@ def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tup
 
 def _fits(
     u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
-) -> tuple[_Joint, _Joint]:
-    """Fit with T and without: rational functions where `smooth` is given to start from."""
+) -> list[_Joint]:
+    """Fit with T and without: rational functions if `smooth` is given to start from."""
     order = _ORDER if smooth is None else TRANSIENT_ORDER
     own = Regressors.around(u, centre, width, transient=order)
-    seen = own.views(y[None])
+    outputs = own.views(y[None])
     found = []
     for columns in (own.both, own.plain):
         if smooth is None:
-            found.append(_joint(own, columns, _polynomial(columns, seen), seen))
+            found.append(_joint(own, columns, _polynomial(columns, outputs), outputs))
             continue
-        with np.errstate(all="ignore"):  # an iterate may run off to infinity; it is not taken
+        with np.errstate(all="ignore"):  # an iterate may diverge; it is then not used
             start = linear_start(columns, own.views(smooth[None]))
-            ended = gauss_newton(columns, seen, start, steps=_STEPS)
-            found.append(_joint(own, columns, ended, seen))
-    return found[0], found[1]
+            solution = gauss_newton(columns, outputs, start, steps=_STEPS)
+            found.append(_joint(own, columns, solution, outputs))
+    return found
 
 
 def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Complex) -> _Joint:
-    """What one fit over each window says at each centre, of all inputs together."""
+    """Responses, condition and coherence at each centre from one fit over each window."""
     m, near = own.power.shape[1], own.windows.near
     local, moved = read_off(own, columns, found, y)
     slope = own.at_centres(moved.swapaxes(2, 3))
@@ -436,11 +392,8 @@ def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Comple
 
 
 def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
-    """Share of what is left without an input's columns that they explain, adjusted for number.
-
-    What Σ|residual|² grows by without them is θᴴ V⁻¹ θ over their own block. Of outputs of power
-    `total`, (w, r); shape (w, r, m + 1).
-    """
+    """Share of the residual without an input's columns that they explain, (w, r, m + 1)."""
+    # Adjusted for the number of columns. Without them Σ|residual|² grows by θᴴ V⁻¹ θ of their own.
     m = own.power.shape[1]
     squares = np.maximum(found.state.squares, 1e-15 * total)
     freedom = np.maximum(own.windows.counted - found.inverse.shape[-1], 1)[:, None]
@@ -459,14 +412,14 @@ def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
 def _polynomial(columns: Columns, y: Complex) -> RationalSolution:
     """Fit Y = linear columns · coefficients, A = 1, to a record of shape (w, 1, s)."""
     linear = columns.linear[:, None]
-    left = np.conj(linear)
-    inverse, theta = solved(left @ linear.swapaxes(2, 3), left @ y[..., None])
+    adjoint = np.conj(linear)
+    inverse, theta = solved(adjoint @ linear.swapaxes(2, 3), adjoint @ y[..., None])
     fitted = (theta[:, :, None] @ linear)[:, :, 0]
     state = RationalState(
         theta=theta,
         over=np.ones_like(y),
         fitted=fitted,
-        left=y - fitted,
+        residual=y - fitted,
         weight=np.ones(y.shape),
         squares=np.sum(np.abs(y - fitted) ** 2, axis=2),
     )

@@ -1,9 +1,9 @@
-"""Windows of neighbouring bins of a record's transform, which every local method fits over.
+"""Windows of neighbouring bins of a record's transform, for every local method.
 
-The bins are those of the unwindowed transform, negative frequencies included: there the
-transforms are the conjugates, so a window may reach through DC. The bin at DC itself holds the
-bias and counts nowhere. For circular noise, whose square has no mean, the mirrored bins bring
-no correlation into E|error|², so least squares and its variances hold as they stand.
+The bins are those of the unwindowed transform, including negative frequencies: these are the
+conjugates, so a window may reach through DC. The bin at DC itself holds the bias and never counts.
+For circular noise, whose square has mean zero, the mirrored bins add no correlation to E|error|²,
+so least squares and its variances stay valid.
 """
 
 from dataclasses import dataclass, fields
@@ -29,18 +29,18 @@ __all__ = [
     "windows_around",
 ]
 
-# Samples from which the FFT's time at an awkward length is felt.
+# Samples from which the FFT is slow at an awkward length.
 _LONG = 100_000
 
 WIDEST = 1000
-"""Bins of the widest window of polynomials, on either side."""
+"""Most bins on either side in a window of polynomials."""
 
 Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spectra:
-    """Transforms of a record whose delay is taken out."""
+    """Transforms of a record with its delay removed."""
 
     frequency: Real  # (b,): Hz, from 0 to below fs/2
     # (b,): input and output; 0 at DC. Of many outputs `y` has shape (..., b).
@@ -50,11 +50,11 @@ class Spectra:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Windows:
-    """Windows of one width, and which of them answers for which centre."""
+    """Windows of one width, and the window of each centre."""
 
     start: Integer  # (w,): first bin of each window, negative below DC
     x: Real  # (s,): place of a window's bins, -1 to 1
-    counted: Integer  # (w,): bins without the one at DC
+    counted: Integer  # (w,): number of bins, without DC
     near: Integer  # (c,): window of each centre
     place: Integer  # (c,): place of each centre in its window
 
@@ -68,14 +68,14 @@ class Windows:
         return np.asarray(self.x[:, None] ** np.arange(order + 1))
 
     def views(self, values: Complex, reach: int) -> Complex:
-        """Return the windows of rows, (r, b), that `mirrored` made, shape (w, r, s)."""
+        """Return the windows of the rows of `mirrored`, (r, b), shape (w, r, s)."""
         out = np.empty((self.start.size, values.shape[0], self.size), dtype=values.dtype)
         for own, first in zip(out, (self.start + reach).tolist(), strict=True):
             own[...] = values[:, first : first + self.size]
         return out
 
     def slots(self) -> tuple[Integer, Integer]:
-        """Return the centres of each window, (w, k), and where each centre is among these, (c,).
+        """Return the centres of each window, (w, k), and the index of each centre in these, (c,).
 
         Windows with fewer centres than others repeat their last.
         """
@@ -85,26 +85,22 @@ class Windows:
         at = np.arange(self.near.size) - first[self.near]
         return slot, self.near * most + at
 
-    def without_dc(self) -> Real:
-        """Return 1 for bins that count and 0 at DC, shape (w, s)."""
-        return np.asarray((self.start[:, None] + np.arange(self.size)) != 0, dtype=np.float64)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LocalFit:
-    """What one local method at one width says at every centre; all of shape (c,).
+    """Results of one local method at one width at every centre; all of shape (c,).
 
-    Of many outputs at once they have shape (..., c), or one that is broadcast to it.
+    For many outputs at once they have shape (..., c), or one that is broadcast to it.
     """
 
     response: Complex  # G; with m inputs at once (c, m), as are `spread` and `power`
-    spread: Real  # variance of G where the noise of a bin of Y is 1
+    spread: Real  # variance of G if the noise of a bin of Y is 1
     noise: Real  # variance of a bin of Y, from the residual over the window
     power: Real  # mean |U|² in the window
-    prediction_error: Real  # square of what the fit without a bin misses there
+    prediction_error: Real  # square of the error at a bin of the fit without it
 
     def of(self, records: NDArray[Any]) -> "LocalFit":
-        """Return what it says of some of many records."""
+        """Return the results of some of many records."""
         each = {f.name: getattr(self, f.name) for f in fields(self)}
         return LocalFit(**{n: v[records] if v.ndim > 1 else v for n, v in each.items()})
 
@@ -121,15 +117,15 @@ def mirrored(values: Complex, reach: int) -> Complex:
 
 
 def transform(u: Real, y: Real, fs: float, delay: float | Real, highest: float = np.inf) -> Spectra:
-    """Transform a record, the delay taken out; or many of one input, delayed by as many samples.
+    """Transform a record with its delay removed, or many outputs of one input at once.
 
-    Its whole samples go by comparing y(n + k) with u(n), so that no response to the stimulus
-    lies beyond the end of the record; the rest goes by its phase, and all of it does where those
-    samples are all in which the input moves. Of a long record the last samples, at most one in
-    forty, are left out for a length that the FFT does fast.
+    The whole samples of the delay are removed by comparing y(n + k) with u(n), so that the record
+    holds every response to the stimulus; the rest is removed by its phase, and all of it if the
+    input moves only in those samples. The last samples of a long record, at most one in forty, are
+    omitted for a length that suits the FFT.
 
-    The output has shape (n,) or (k, n); its delays in s, of many outputs in one and the same
-    sample, () or (k,). Bins that no window reaches of a response up to `highest`, Hz, are left out.
+    The output has shape (n,) or (k, n), its delays in s () or (k,), all in the same sample. Bins
+    beyond the windows of a response up to `highest`, Hz, are omitted.
 
     Examples
     --------
@@ -167,7 +163,7 @@ def _transform(u: Real, count: int) -> Complex:
 
 
 def centres_in_band(low: int, high: int, points: int) -> Integer:
-    """Return the bins to answer at: all from `low` to `high`, or spaced by a constant ratio.
+    """Return the bins of a response: all from `low` to `high`, or spaced by a constant ratio.
 
     Examples
     --------
@@ -180,12 +176,12 @@ def centres_in_band(low: int, high: int, points: int) -> Integer:
 
 
 def windows_around(centre: Integer, bins: int, width: int) -> Windows:
-    """Return windows of 2 `width` + 1 bins, one for every third of a width where centres are.
+    """Return windows of 2 `width` + 1 bins, one for every third of a width that has centres.
 
-    A polynomial or rational function is as good a little off the middle of its window, so one
-    fit answers for all centres within a sixth of the width. At the upper end of the spectrum
-    windows stay inside. The bins to answer at, (c,), increase and are above 0; those of the spectra
-    include DC; the width is the number of neighbours on either side.
+    A polynomial or rational function is as good a little off the middle of its window, so one fit
+    serves all centres within a sixth of the width. At the upper end of the spectrum windows stay
+    inside. The centres, (c,), increase and are above 0; the bins of the spectra include DC; the
+    width is the number of neighbours on either side.
 
     Examples
     --------

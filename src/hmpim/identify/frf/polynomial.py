@@ -11,46 +11,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.frf.neighbours import (
-    Integer,
-    LocalFit,
-    Spectra,
-    Windows,
-    mirrored,
-    windows_around,
-)
+from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
 from hmpim.identify.kept import kept
 
 __all__ = ["polynomial_fits"]
 
 _RIDGE = 1e-13
-# Power of U, relative to its greatest, that counts as none.
+# Power of U, over its greatest, that counts as zero.
 _NOTHING = 1e-24
-# Products of bins held at once, about 80 MB.
+# Products of bins in memory at once, about 80 MB.
 _CHUNK = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Way:
-    """What the input says of all windows with T, or without: the columns of G, then those of T."""
+    """Normal equations with T, or without: the columns of G, then those of T."""
 
     inverse: NDArray[np.inexact]  # (w, q, q): of the normal equations
-    # (k, c): variance of G where the noise of a bin is 1, and what a centre's own bin weighs in its
-    # fit
-    spread: Real
-    leverage: Real
-    freedom: Integer  # (w,): bins of a window less coefficients
+    spread: Real  # (k, c): variance of G if the noise of a bin is 1
+    leverage: Real  # (k, c): weight of a centre's own bin in its fit
+    freedom: NDArray[np.int64]  # (w,): bins of a window less coefficients
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Solver:
-    """What the input says of windows of k widths, those of each width after the last's."""
+    """All that depends on the input alone, for windows of k widths, one width after the other."""
 
     windows: tuple[Windows, ...]  # of each width
     powers: tuple[Real, ...]  # (s, order + 1): x^p on a window's bins
-    near: Integer  # (k, c): window of each centre
+    near: NDArray[np.int64]  # (k, c): window of each centre
     here: Real  # (k, c, order + 1): x^p at each centre
-    size: Real  # (w,): by what G's columns are scaled
+    size: Real  # (w,): scale of G's columns
     row: Complex  # (k, c, q): conjugates of the columns at each centre
     ways: tuple[_Way, ...]  # with T, and without
 
@@ -60,13 +51,12 @@ def polynomial_fits(
 ) -> list[LocalFit]:
     """Fit G and T, and G alone, over windows of each width.
 
-    The normal equations are made of moments Σ A x^p over a window, x = -1 … 1, of five
-    products A; so all windows share one matrix of powers. Their left sides, all that is told of
-    the input alone, are made once for records of one stimulus.
+    The normal equations consist of moments Σ A x^p over a window, x = -1 … 1, of five products A,
+    so that all windows share one matrix of powers. Their left sides, which depend on the input
+    alone, are computed once for records of one stimulus.
 
-    Of spectra with the delay taken out, at bins of shape (c,), over so many neighbours on either
-    side; the order is that of both polynomials. There are two fits of each width: with T, and
-    without.
+    The centres have shape (c,), the widths are numbers of neighbours on either side, and both
+    polynomials have one order. Each width has two fits: with T, and without.
 
     Examples
     --------
@@ -100,13 +90,13 @@ def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], orde
     reach = min(max(widths), u.size - 1)
     folded = mirrored(u, reach)
     power = np.abs(folded) ** 2
-    # What all bins but that at DC say of T.
+    # The last product is that of T with itself: 1, and 0 at DC.
     products = np.stack((power + 0j, np.conj(folded), (np.arange(folded.size) != reach) + 0j))
     sums = [_moments(products, own, reach, x) for own, x in zip(windows, powers, strict=True)]
     squares, own, ones = np.concatenate(sums, axis=-2)
-    counted = np.concatenate([one.counted for one in windows])
-    # G's columns are scaled to the size of T's, whatever the unit of U; where there is no U at
-    # all, G comes out as zero with a huge error.
+    counted = np.concatenate([each.counted for each in windows])
+    # G's columns are scaled to the size of T's, in any unit of U; without any U, G is zero with a
+    # huge error.
     size = np.sqrt(np.maximum(squares[:, 0].real / counted, _NOTHING * float(np.max(power))))
     pair = np.add.outer(np.arange(terms), np.arange(terms))
     gram = np.empty((size.size, 2 * terms, 2 * terms), dtype=np.complex128)
@@ -115,38 +105,41 @@ def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], orde
     gram[:, :terms, terms:] = cross
     gram[:, terms:, :terms] = np.conj(cross.swapaxes(1, 2))
     gram[:, terms:, terms:] = ones[:, pair]
-    bins = np.repeat([one.size for one in windows], [one.start.size for one in windows])
+    counts = [each.start.size for each in windows]
+    bins = np.repeat([each.size for each in windows], counts)
     gram.reshape(bins.size, -1)[:, :: 2 * terms + 1] += _RIDGE * bins[:, None]
-    first = np.cumsum([0, *(one.start.size for one in windows[:-1])])
-    near = np.stack([one.near for one in windows]) + first[:, None]
-    here = np.stack([x[one.place] for one, x in zip(windows, powers, strict=True)])
-    seen = u[centre] / size[near]
+    first = np.cumsum([0, *counts[:-1]])
+    near = np.stack([each.near for each in windows]) + first[:, None]
+    here = np.stack([x[each.place] for each, x in zip(windows, powers, strict=True)])
+    input_here = u[centre] / size[near]
     inverse = np.linalg.inv(gram)
     plain = np.linalg.inv(gram[:, :terms, :terms].real)
     mixed = inverse[:, :terms, terms:]
     kinds = (inverse[:, :terms, :terms], mixed, mixed.imag, inverse[:, terms:, terms:], plain)
     blocks = np.stack([kind.real.reshape(bins.size, -1) for kind in kinds], axis=1)
-    told = np.einsum("kcij,kcj->ikc", (blocks @ _collected(order))[near], here)
-    alone, real, imaginary, rest, lone = told
-    squared = seen.real**2 + seen.imag**2
+    forms = np.einsum("kcij,kcj->ikc", (blocks @ _collected(order))[near], here)
+    own_form, real, imaginary, rest, plain_form = forms
+    squared = input_here.real**2 + input_here.imag**2
+    cross_form = 2 * (input_here.real * real - input_here.imag * imaginary)
+    rows = (here[..., :terms] * input_here[..., None], here[..., :terms])
     return _Solver(
         windows=windows,
         powers=tuple(np.ascontiguousarray(x[:, :terms]) for x in powers),
         near=near,
         here=here[..., :terms],
         size=size,
-        row=np.conj(np.concatenate((here[..., :terms] * seen[..., None], here[..., :terms]), -1)),
+        row=np.conj(np.concatenate(rows, -1)),
         ways=(
             _Way(
                 inverse=inverse,
-                spread=np.maximum(alone, 0.0),
-                leverage=squared * alone + 2 * (seen.real * real - seen.imag * imaginary) + rest,
+                spread=np.maximum(own_form, 0.0),
+                leverage=squared * own_form + cross_form + rest,
                 freedom=counted - 2 * terms,
             ),
             _Way(
                 inverse=plain,
-                spread=np.maximum(lone, 0.0),
-                leverage=squared * lone,
+                spread=np.maximum(plain_form, 0.0),
+                leverage=squared * plain_form,
                 freedom=counted - terms,
             ),
         ),
@@ -155,13 +148,13 @@ def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], orde
 
 @cache
 def _collected(order: int) -> Real:
-    """Sums the coefficients of x^p x^r in a matrix by powers of x, ((order + 1)², 2 order + 1)."""
+    """Matrix that sums coefficients of x^p x^r by power of x, ((order + 1)², 2 order + 1)."""
     index = np.arange(order + 1)
     return np.asarray(np.add.outer(index, index).reshape(-1, 1) == np.arange(2 * order + 1)) * 1.0
 
 
 def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> Complex:
-    """Σ A x^p over each window, (..., w, p), of products A, (..., b), that `mirrored` made."""
+    """Σ A x^p over each window, (..., w, p), of mirrored products A, (..., b)."""
     start = windows.start + reach
     chunk, index = max(_CHUNK // windows.size, 1), np.arange(windows.size)
     some = (start[k : k + chunk, None] + index for k in range(0, start.size, chunk))
@@ -170,16 +163,13 @@ def _moments(products: Complex, windows: Windows, reach: int, powers: Real) -> C
 
 
 def _solve(solver: _Solver, way: _Way, right: Complex, power: Real, y: Complex) -> list[LocalFit]:
-    """Solve the normal equations of one way, and read off each centre; a fit of each width.
-
-    `right` are right sides with T, (..., w, q), and `power` is that of the output, (..., w).
-    """
+    """One fit for each width, from right sides with T, (..., w, q), and power of Y, (..., w)."""
     columns, terms = way.inverse.shape[-1], solver.here.shape[-1]
     near, right = solver.near, right[..., :columns]
     theta = (way.inverse @ right[..., None])[..., 0]
-    left = power - np.vecdot(right, theta).real
-    # The difference of two nearly equal sums is never less than its rounding.
-    noise = np.maximum(left, 1e-15 * power) / np.maximum(way.freedom, 1)
+    squares = power - np.vecdot(right, theta).real
+    # The difference of two nearly equal sums cannot be less than its rounding.
+    noise = np.maximum(squares, 1e-15 * power) / np.maximum(way.freedom, 1)
     theta, size = theta.take(near, axis=-2), solver.size[near]
     missed = y - np.vecdot(solver.row[..., :columns], theta)
     response = np.vecdot(solver.here, theta[..., :terms]) / size

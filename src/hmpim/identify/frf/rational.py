@@ -3,14 +3,13 @@
 B, T and A are polynomials over neighbouring bins: T. McKelvey and G. Guerin, "Nonparametric
 frequency response estimation using a local rational model", SYSID 2012; R. Voorhoeve,
 A. van der Maas and T. Oomen, "Non-parametric identification of multivariable systems: a local
-rational modeling approach", Mech. Syst. Signal Process. 105, 2018. A resonance, which a
-polynomial follows over a few bins only, a rational function of order two follows exactly.
+rational modeling approach", Mech. Syst. Signal Process. 105, 2018. A rational function of order two
+follows a resonance exactly, a polynomial only over a few bins.
 
-McKelvey and Guerin multiply by A and solve the linear problem, which weighs the noise by A and
-sets it among the regressors; the answer is biased. Here the linear problem only gives the
-start, from an output already smoothed, and Gauss-Newton steps on Y itself lead to the least
-squares of the true residual. The covariance is that of those least squares, the columns of A
-included, so it knows what the denominator costs.
+McKelvey and Guerin multiply by A and solve the linear problem. This weights the noise by A and puts
+it into the regressors, so the result is biased. Here the linear problem only gives the start, from
+an output already smoothed, and Gauss-Newton steps on Y itself minimise the true residual. The
+covariance is that of this least-squares problem, including the columns of A.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -40,7 +39,6 @@ __all__ = [
     "linear_start",
     "rational_fits",
     "read_off",
-    "restricted",
     "solved",
 ]
 
@@ -48,7 +46,7 @@ NUMERATOR = 2
 """Order of B."""
 
 TRANSIENT_ORDER = 3
-"""One more than of B: what a sampled transient rings with is a polynomial in z, not in jω."""
+"""One more than B's: a sampled transient is a polynomial in z, not in jω."""
 
 _STEPS = 4
 _NOTHING = 1e-24
@@ -59,29 +57,26 @@ _RIDGE = 1e-13
 class RationalState:
     """An iterate at every window, of each record."""
 
-    # (w, r, q): coefficients of the linear columns, then of A without its constant 1
-    theta: Complex
-    # (w, r, s): 1 / A, Y as fitted, and what that leaves of Y, on the window's bins
-    over: Complex
-    fitted: Complex
-    left: Complex
+    theta: Complex  # (w, r, q): coefficients of the linear columns, then of A without its 1
+    over: Complex  # (w, r, s): 1 / A on the window's bins
+    fitted: Complex  # (w, r, s): Y as fitted
+    residual: Complex  # (w, r, s): Y - fitted
     weight: Real  # (w, r, s): 1 / |A|²
-    squares: Real  # (w, r): Σ |Y - fitted|²; infinite where the iterate ran off
+    squares: Real  # (w, r): Σ |Y - fitted|²; infinite if the iterate diverged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RationalSolution:
-    """Where the iteration ended, and the inverse of the products of the derivatives there."""
+    """The end of the iteration, and the inverse normal matrix there."""
 
     state: RationalState  # the best iterate of each window
-    before: RationalState  # that before the last step, which was small: derivatives are taken there
-    # (w, r, q, q): of the products of the conjugates of the derivatives with them: the covariance
-    # of `theta` where the noise of a bin is 1. Of a polynomial, it is that of the linear columns
-    # alone.
+    before: RationalState  # that before the last, small step: derivatives are taken there
+    # (w, r, q, q): covariance of `theta` if the noise of a bin is 1; of a polynomial, that of the
+    # linear columns alone
     inverse: Complex
 
     def is_rational(self, columns: Columns) -> bool:
-        """Whether there is an A beside the linear columns."""
+        """Whether there is an A in addition to the linear columns."""
         return bool(self.inverse.shape[-1] > columns.linear.shape[1])
 
     def rows(self, columns: Columns, place: Integer) -> Complex:
@@ -98,19 +93,18 @@ class RationalSolution:
 
 def _at(values: NDArray[Any], place: Integer) -> NDArray[Any]:
     """Values on windows, (w, r, s), at places of each, (w, k); shape (w, r, k)."""
-    # The two indices stand apart, so that what they choose comes first.
+    # The two indices are not adjacent, so that their result comes first.
     return np.asarray(values[np.arange(place.shape[0])[:, None], :, place].swapaxes(1, 2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Regressors:
-    """What the input alone says of windows of one width."""
+    """All that depends on the input alone, for windows of one width."""
 
     windows: Windows  # of this width
-    power: Real  # (w, m): mean |U|² of each, to which its m inputs are scaled
-    # with T, and without
-    both: Columns
-    plain: Columns
+    power: Real  # (w, m): mean |U|² of each window and input, to which inputs are scaled
+    both: Columns  # with T
+    plain: Columns  # without T
     place: Integer  # (w, k): centres of each window, the last repeated
     centres: Integer  # (c,): each centre among these
 
@@ -118,19 +112,20 @@ class Regressors:
     def around(
         cls, u: Complex, centre: Integer, width: int, *, transient: int = TRANSIENT_ORDER
     ) -> "Regressors":
-        """Make them of the transform of an input, (b,), or of several, (m, b).
+        """Make them from the transform of an input, (b,), or of several, (m, b).
 
-        The bins to answer at have shape (c,), the width is at least 6 neighbours on either side,
-        and `transient` is the order of T.
+        The centres have shape (c,), the width is at least 6 neighbours on either side, and
+        `transient` is the order of T.
         """
         u = np.atleast_2d(u)
         windows = windows_around(centre, u.shape[-1], width)
         floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
-        seen = windows.views(mirrored(u, width), width)
-        power = np.sum(np.abs(seen) ** 2, axis=2) / windows.counted[:, None]
+        inputs = windows.views(mirrored(u, width), width)
+        power = np.sum(np.abs(inputs) ** 2, axis=2) / windows.counted[:, None]
         power = np.maximum(power, floor)
-        one = windows.without_dc()[:, None, :].astype(np.complex128)
-        carriers = np.concatenate((seen / np.sqrt(power)[:, :, None], one), axis=1)
+        ones = (windows.start[:, None] + np.arange(windows.size) != 0).astype(np.complex128)
+        scaled = inputs / np.sqrt(power)[:, :, None]
+        carriers = np.concatenate((scaled, ones[:, None]), axis=1)
         slot, centres = windows.slots()
         both = Columns.of(carriers, (*(NUMERATOR,) * len(u), transient), windows.x)
         return cls(
@@ -158,53 +153,22 @@ def rational_fits(
 ) -> tuple[list[LocalFit], Real]:
     """Fit rational functions of order 2 over 2, with T and without, over windows of one width.
 
-    Parameters
-    ----------
-    spectra : Spectra
-        With the delay taken out, of r records.
-    own : Regressors
-        Those of `spectra.u`.
-    smooth : complex ndarray, shape (r, b)
-        Y as a first estimate predicts it, nearly free of noise.
-
-    Returns
-    -------
-    fits : list of LocalFit
-        Two: with T, and without.
-    peak : ndarray, shape (r,)
-        Greatest power of a bin that the fit with T leaves, over the mean of its window.
-
-    Examples
-    --------
-    >>> from hmpim.identify.frf.neighbours import transform
-    >>> n = np.arange(400)
-    >>> u, y = np.sin(n**2 / 1000), np.zeros(400)
-    >>> for k in n[2:]:  # poles at 0.9 exp(±0.44 i)
-    ...     y[k] = 1.628 * y[k - 1] - 0.81 * y[k - 2] + u[k]
-    >>> s = transform(u, y[None], 1.0, 0.0)
-    >>> (fit, _), _ = rational_fits(s, Regressors.around(s.u, np.arange(20, 40), 16), s.y)
-    >>> z = np.exp(2j * np.pi * s.frequency[20])
-    >>> bool(abs(fit.response[0, 0] * (1 - 1.628 / z + 0.81 / z**2) - 1) < 1e-3)
-    True
+    `own` are the regressors of `spectra.u`, and `smooth`, (r, b), is a first estimate of Y, nearly
+    free of noise. With the two fits comes, for each of the r records, the greatest power of a bin
+    in the residual of the fit with T, over the mean of its window.
     """
     y = own.views(spectra.y)
-    # An iterate may run off to infinity; it is then not taken.
-    with np.errstate(all="ignore"):
+    fits = []
+    with np.errstate(all="ignore"):  # an iterate may diverge; it is then not used
         full = gauss_newton(own.both, y, linear_start(own.both, own.views(smooth)), steps=_STEPS)
-        plain = gauss_newton(own.plain, y, restricted(full, NUMERATOR + 1), steps=1)
-        fits = [
-            _of_one_input(read_off(own, columns, found, y)[0])
-            for columns, found in ((own.both, full), (own.plain, plain))
-        ]
-        left = full.state.left.real**2 + full.state.left.imag**2
-        peak = np.max(left.max(axis=-1) / left.mean(axis=-1), axis=0)
+        plain = gauss_newton(own.plain, y, _restricted(full, NUMERATOR + 1), steps=1)
+        for columns, found in ((own.both, full), (own.plain, plain)):
+            fit, _ = read_off(own, columns, found, y)
+            response, spread, power = fit.response[..., 0], fit.spread[..., 0], fit.power[..., 0]
+            fits.append(replace(fit, response=response, spread=spread, power=power))
+        squares = full.state.residual.real**2 + full.state.residual.imag**2
+        peak = np.max(squares.max(axis=-1) / squares.mean(axis=-1), axis=0)
     return fits, peak
-
-
-def _of_one_input(fit: LocalFit) -> LocalFit:
-    """The same without the axis of the inputs."""
-    response, spread, power = fit.response[..., 0], fit.spread[..., 0], fit.power[..., 0]
-    return replace(fit, response=response, spread=spread, power=power)
 
 
 def solved(gram: Complex, right: Complex) -> tuple[Complex, Complex]:
@@ -229,7 +193,7 @@ def _solution(gram: Complex, right: Complex) -> Complex:
 
 
 def _scaled(gram: Complex) -> tuple[Complex, Real]:
-    """Normal equations of columns of size 1, (..., q, q), and by what each was multiplied."""
+    """Normal matrix of columns of size 1, (..., q, q), and the factor of each column."""
     q = gram.shape[-1]
     scale = 1.0 / np.sqrt(np.maximum(gram.diagonal(axis1=-2, axis2=-1).real, 1e-300))
     scaled = gram * (scale[..., :, None] * scale[..., None, :])
@@ -245,18 +209,16 @@ def linear_start(columns: Columns, smooth: Complex) -> Complex:
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None, None]
-    >>> one = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x)
-    >>> np.abs(linear_start(one, y)).round(9).tolist()
+    >>> columns = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x)
+    >>> np.abs(linear_start(columns, y)).round(9).tolist()
     [[[2.0, 0.5, 0.0]]]
     """
     return _solution(*columns.normal(None, np.ones(smooth.shape), smooth, smooth))
 
 
-def restricted(found: RationalSolution, kept: int) -> Complex:
-    """Return what a solution becomes, to first order, if only `kept` linear columns may stay.
-
-    θ₁ - V₁₂ V₂₂⁻¹ θ₂, V the inverse of the products: least squares under θ₂ = 0.
-    """
+def _restricted(found: RationalSolution, kept: int) -> Complex:
+    """Return the solution, to first order, with only the first `kept` linear columns."""
+    # θ₁ - V₁₂ V₂₂⁻¹ θ₂ is the least-squares solution under θ₂ = 0.
     q = found.state.theta.shape[-1]
     out = np.arange(kept, q - DENOMINATOR_ORDER)
     stay = np.delete(np.arange(q), out)
@@ -268,21 +230,21 @@ def restricted(found: RationalSolution, kept: int) -> Complex:
 def gauss_newton(columns: Columns, y: Complex, theta: Complex, *, steps: int) -> RationalSolution:
     """Fit Y = (linear columns · coefficients) / A, A = 1 + powers of x · coefficients.
 
-    Of records of shape (w, r, s), from a start, (w, r, l + d), such as that of `linear_start`, in
-    at least one step; each window keeps its best iterate.
+    The records have shape (w, r, s), the start, as of `linear_start`, (w, r, l + d). At least one
+    step is made; each window keeps its best iterate.
 
     Examples
     --------
     >>> x = np.linspace(-1, 1, 9)
     >>> y = (2.0 / (1 + 0.5j * x))[None, None]
-    >>> one, start = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x), np.array([[[1.9, 0.4j, 0.0]]])
-    >>> found = gauss_newton(one, y, start, steps=4)
+    >>> columns, start = Columns.of(np.ones((1, 1, 9)) + 0j, (0,), x), np.array([[[1.9, 0.4j, 0]]])
+    >>> found = gauss_newton(columns, y, start, steps=4)
     >>> np.abs(found.state.theta).round(9).tolist()
     [[[2.0, 0.5, 0.0]]]
     """
     state = _state(columns, y, theta)
     for k in range(steps):
-        gram, right = columns.normal(state.over, state.weight, state.fitted, state.left)
+        gram, right = columns.normal(state.over, state.weight, state.fitted, state.residual)
         if k < steps - 1:
             step = _solution(gram, right)
         else:
@@ -295,40 +257,39 @@ def _state(columns: Columns, y: Complex, theta: Complex) -> RationalState:
     count = columns.linear.shape[-2]
     denominator = theta[..., count:] @ columns.slopes
     denominator += 1.0
-    # Quicker than a complex division, which guards against what is not taken: overflow.
+    # Faster than a complex division, which guards against overflow: such iterates are not used.
     weight = 1.0 / (denominator.real**2 + denominator.imag**2)
     over: Complex = np.multiply(np.conj(denominator), weight, dtype=np.complex128)
     fitted = theta[..., :count] @ columns.linear
     fitted *= over
-    left = y - fitted
-    squares = np.vecdot(left, left).real
+    residual = y - fitted
+    squares = np.vecdot(residual, residual).real
     return RationalState(
         theta=theta,
         over=over,
         fitted=fitted,
-        left=left,
+        residual=residual,
         weight=weight,
         squares=np.where(np.isfinite(squares), squares, np.inf),
     )
 
 
-def _better(one: RationalState, other: RationalState) -> RationalState:
-    """Take each window from the iterate that leaves less; what is not taken of `other` is lost."""
-    kept = ~(other.squares < one.squares)
+def _better(old: RationalState, new: RationalState) -> RationalState:
+    """Take each window from the iterate with the smaller residual; this overwrites `new`."""
+    kept = ~(new.squares < old.squares)
     if kept.any():
         for name in (field.name for field in fields(RationalState)):
-            getattr(other, name)[kept] = getattr(one, name)[kept]
-    return other
+            getattr(new, name)[kept] = getattr(old, name)[kept]
+    return new
 
 
 def read_off(
     regressors: Regressors, columns: Columns, found: RationalSolution, y: Complex
 ) -> tuple[LocalFit, Complex]:
-    """Read off the responses to all inputs at each centre, (r, c, m).
+    """Return the responses to all inputs at each centre, (r, c, m), and their derivatives.
 
-    With them come their derivatives by the coefficients, (w, r, m, k, q), as `Regressors.place` has
-    the centres, of inputs scaled to a power of 1. `prediction_error` is infinite where the
-    iteration came to nothing.
+    The derivatives by the coefficients, (w, r, m, k, q), are at `Regressors.place`, for inputs
+    scaled to a power of 1. `prediction_error` is infinite if the iteration failed.
     """
     windows, power, terms = regressors.windows, regressors.power, NUMERATOR + 1
     place, near, m = regressors.place, regressors.windows.near, regressors.power.shape[1]
@@ -346,13 +307,13 @@ def read_off(
         np.multiply(bent, x[:, None, None], out=moved[:, :, :m, :, -DENOMINATOR_ORDER:])
     moved[:, :, m] = row
     flat = moved.reshape(*own.shape[:2], -1, row.shape[-1])
-    product = flat @ found.inverse  # of v V vᴴ, the real part alone is asked for
-    told = np.vecdot(flat.view(np.float64), product.view(np.float64)).reshape(moved.shape[:-1])
-    missed = _at(found.state.left, place) / np.maximum(1.0 - told[:, :, m], 1e-6)
+    product = flat @ found.inverse  # only the real part of v V vᴴ is needed
+    forms = np.vecdot(flat.view(np.float64), product.view(np.float64)).reshape(moved.shape[:-1])
+    missed = _at(found.state.residual, place) / np.maximum(1.0 - forms[:, :, m], 1e-6)
     error = missed.real**2 + missed.imag**2
     squares = np.maximum(found.state.squares, 1e-15 * np.vecdot(y, y).real)
     noise = squares / np.maximum(windows.counted - row.shape[-1], 1)[:, None]
-    response, spread = response.swapaxes(2, 3), told[:, :, :m].swapaxes(2, 3)
+    response, spread = response.swapaxes(2, 3), forms[:, :, :m].swapaxes(2, 3)
     failed = ~(np.isfinite(error) & np.isfinite(response + spread).all(axis=-1))
     lost, size = failed[..., None], power[:, None, None]
     fit = LocalFit(

@@ -1,4 +1,4 @@
-"""Other assumptions on what the input does between its samples, and what they would move."""
+"""Other assumptions about the input between its samples, and the figures that they would move."""
 
 from collections.abc import Iterable, Iterator
 
@@ -19,32 +19,31 @@ SIZES = (
     "bandwidth_phase90_without_delay",
     "bandwidth_3db",
 )
-"""Figures that a share says something of."""
+"""Figures whose error is stated as a share of their value."""
 
 _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
-"""What moves with the delay, or with the structure that goes with it."""
+"""Figures that move with the delay, or with the structure."""
 
 _WORDS = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
 
 
 def other_intersample(evidence: Evidence) -> Iterator[Finding]:
     """Name the assumptions that fit as well: the intervals cover them."""
-    best, own = evidence.joint.best, evidence.joint.best.fit.structure.name
-    rivals = [
-        (one.intersample, one.fit.delay - best.fit.delay, name if name != own else "")
-        for one in rivals_of(evidence.joint, evidence.owed)
-        for name in (one.fit.structure.name,)
-    ]
+    best, rivals = evidence.joint.best, []
+    for trial in rivals_of(evidence.joint, evidence.owed):
+        name = trial.fit.structure.name
+        other = name if name != best.fit.structure.name else ""
+        rivals.append((trial.intersample, trial.fit.delay - best.fit.delay, other))
     yield from undetermined_between(best.intersample, rivals)
 
 
 def undetermined_between(
     taken: Intersample, rivals: Iterable[tuple[Intersample, float, str]]
 ) -> Iterator[Finding]:
-    """Name the assumptions that fit as well as the one that is taken, if they move the delay.
+    """Name the assumptions that fit as well as the one taken, if they move the delay.
 
-    `rivals` holds each that fits as well, by how many samples it moves the delay, and the structure
-    that goes with it if that is another one, else an empty word.
+    `rivals` holds each of these assumptions, the samples by which it moves the delay, and its
+    structure, empty if that is the same.
     """
     moves = []
     for mode, apart, other in rivals:
@@ -64,13 +63,13 @@ def undetermined_between(
 
 
 def _a_model(structure: str) -> str:
-    """Name a structure, a remark on it behind: 'a first-order model (with a zero)'."""
+    """Name a structure, with its remark last: 'a first-order model (with a zero)'."""
     name, _, remark = structure_in_words(structure).partition(" (")
     return f"a {name} model" + (f" ({remark}" if remark else "")
 
 
 def _delay(apart: float) -> str:
-    """Compare a delay that is so many samples longer with the one that is stated."""
+    """Compare a delay that is `apart` samples longer with the stated one."""
     size = f"{abs(apart):.2f}"
     if size == "0.00":
         return "the same delay"
@@ -78,16 +77,16 @@ def _delay(apart: float) -> str:
 
 
 def wide_span(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt figures that the models which this record allows put far apart."""
+    """Doubt figures that differ widely among the models that the record allows."""
     wide: dict[str, str] = {}
     for name in SIZES:
         estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
         if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
-        if own.spread > abs(own.value):  # it is not determined, which another check says
+        if own.spread > abs(own.value):  # undetermined, which another check reports
             continue
-        if low is None or high is None:  # a model has none
+        if low is None or high is None:  # a model lacks it
             wide[name] = f"below {high:.4g}" if low is None else f"above {low:.4g}"
         elif high - low > PART * abs(estimate.value):
             wide[name] = f"from {low:.4g} to {high:.4g}"

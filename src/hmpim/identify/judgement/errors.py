@@ -1,4 +1,4 @@
-"""Error bars that are too wide for the figure, and a fit that did not end."""
+"""Error bars that are too wide for the figure, and a fit that did not converge."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ __all__ = ["not_converged", "weak_delay", "weak_excitation"]
 
 
 def not_converged(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a fit that stopped on its way."""
+    """Doubt a fit that stopped before it converged."""
     if evidence.joint.best.fit.converged:
         return
     yield Finding(
@@ -26,11 +26,7 @@ def not_converged(evidence: Evidence) -> Iterator[Finding]:
 
 
 def weak_excitation(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt each parameter whose standard deviation is above 30 % of its value.
-
-    With the scale factor the bias, where the input is far from zero; with the natural frequency the
-    delay, where nothing is known of it: what a pole does that may lie anywhere, a delay does too.
-    """
+    """Doubt each parameter whose standard deviation is above 30 % of its value."""
     p = evidence.readings.parameters
     for name in SIZES:
         estimate: Estimate | None = getattr(p, name)
@@ -48,23 +44,19 @@ def weak_excitation(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _along(name: str, estimate: Estimate, evidence: Evidence) -> tuple[str, ...]:
-    """What is in doubt with a parameter that the record does not determine."""
-    if name == "scale_factor" and _moves_the_bias(evidence):
-        return ("bias",)
+    """Parameters that are in doubt together with one that the record does not determine."""
+    if name == "scale_factor":
+        cov, scale = evidence.readings.covariance, 1 + evidence.joint.best.fit.structure.order
+        # With an input far from zero most of the bias's variance is that of the scale factor.
+        if cov[scale, -1] ** 2 > MOST * cov[scale, scale] * cov[-1, -1]:
+            return ("bias",)
     if name == "natural_frequency" and estimate.spread > abs(estimate.value):
-        return ("delay",)
+        return ("delay",)  # a pole that may be anywhere acts like a delay
     return ()
 
 
-def _moves_the_bias(evidence: Evidence) -> bool:
-    """Whether most of the bias's variance is that of the scale factor: zero input is far away."""
-    cov, scale = evidence.readings.covariance, 1 + evidence.joint.best.fit.structure.order
-    shared = cov[scale, -1] ** 2
-    return bool(shared > MOST * cov[scale, scale] * cov[-1, -1])
-
-
 def _how_well(words: str, estimate: Estimate) -> str:
-    """State a deviation in per cent of the value while it is below the value."""
+    """State a deviation in per cent of the value, if it is below the value."""
     if estimate.spread < abs(estimate.value):
         percent = 100 * estimate.spread / abs(estimate.value)
         return (
@@ -80,8 +72,8 @@ def weak_delay(evidence: Evidence) -> Iterator[Finding]:
     delays = {"delay": p.delay, "delay_low_frequency": p.delay_low_frequency}
     blurred = tuple(
         name
-        for name, one in delays.items()
-        if one is not None and one.spread > max(BLURRED / evidence.fs, MUCH * abs(one.value))
+        for name, delay in delays.items()
+        if delay is not None and delay.spread > max(BLURRED / evidence.fs, MUCH * abs(delay.value))
     )
     if p.delay is None or "delay" not in blurred:
         return

@@ -1,4 +1,4 @@
-"""What a check looks at: the fit, what was read off it, and what the record says beside it."""
+"""The data of a check: the fit, the figures from it, and the tests of the record."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,60 +21,25 @@ __all__ = ["Evidence", "structure_in_words"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """One pair, fitted and read, before anything is said of it.
-
-    Parameters
-    ----------
-    joint : JointFit
-        The fit.
-    readings : Readings
-        What was read off it.
-    misfit : Misfit
-        What the residual still owes to the input.
-    u : ndarray, shape (n,)
-        The input, in its own unit.
-    fs : float
-        Rate in Hz.
-    band : (float, float)
-        Excited band in Hz.
-    fit_percent : float
-        100 (1 - ‖residual‖ / ‖deviation of the output‖).
-    measured : ResponseBandwidths
-        Bandwidths read off the measured response.
-    spanned : Parameters
-        What was read off the fit, with intervals that cover every model the record allows.
-    bends : tuple of Bend
-        Nonlinearities that the record leaves in question; none where figures are doubted anyway.
-    nonlinear : float
-        Share of the residual's power that is known to be nonlinear; 0 where none is.
-    held : bool
-        Whether the output is held, so that its measured response shows the hold too.
-    through : bool
-        Whether the pair was identified through a loop's reference.
-    jittered : bool
-        Whether the stamps strayed from a uniform clock, so that samples are interpolated.
-    limited : bool
-        Whether the input is what a unit of limited speed follows, and not what was recorded.
-    gaining : GainChange or None
-        What is known of a gain that changes along the record; None where nothing says so.
-    """
+    """One fitted pair before its checks."""
 
     joint: JointFit
     readings: Readings
-    misfit: Misfit
-    u: Real
-    fs: float
-    band: tuple[float, float]
-    fit_percent: float
-    measured: ResponseBandwidths
-    spanned: Parameters
+    misfit: Misfit  # the part of the residual that still follows the input
+    u: Real  # (n,): the input, in its own unit; empty for statistics
+    fs: float  # Hz
+    band: tuple[float, float]  # excited band, Hz
+    fit_percent: float  # 100 (1 - ‖residual‖ / ‖deviation of the output‖)
+    measured: ResponseBandwidths  # from the measured response
+    spanned: Parameters  # with intervals that cover every model the record allows
+    # nonlinearities that the record does not exclude; none if figures are doubted anyway
     bends: tuple[Bend, ...] = ()
-    nonlinear: float = 0.0
-    held: bool = False
-    through: bool = False
-    jittered: bool = False
-    limited: bool = False
-    gaining: GainChange | None = None
+    nonlinear: float = 0.0  # share of the residual's power that is known to be nonlinear
+    held: bool = False  # whether the output is held, so that its measured response shows the hold
+    through: bool = False  # whether the pair was identified through a loop's reference
+    jittered: bool = False  # whether the stamps are uneven, so that samples are interpolated
+    limited: bool = False  # whether the input is the command as a unit of limited speed follows it
+    gaining: GainChange | None = None  # a gain that changes along the record, if there is evidence
 
     @property
     def has_samples(self) -> bool:
@@ -85,8 +50,7 @@ class Evidence:
     def of_other_poles(self) -> tuple[str, ...]:
         """Figures that other poles would move.
 
-        The response within the band is the same with them if the model leaves white noise, or
-        little of the output; of one that leaves more, no figure is known.
+        If the residual is white or small, the response within the band stays the same.
         """
         described = self.readings.white or self.unexplained <= TOLERATED
         return PHASE_SPLIT if described else MODELLED
@@ -98,15 +62,15 @@ class Evidence:
 
     @property
     def owed(self) -> float:
-        """Share of the residual's power that still follows the input; 0 if by chance, or little."""
-        told = self.misfit.probability < FALSE_ALARM and self.misfit.share > 2 * FEW
-        return self.misfit.share if told else 0.0
+        """Share of the residual's power that follows the input; 0 if insignificant or small."""
+        significant = self.misfit.probability < FALSE_ALARM and self.misfit.share > 2 * FEW
+        return self.misfit.share if significant else 0.0
 
     @property
     def is_without_noise(self) -> bool:
-        """Whether the residual may be the error of interpolation between the samples.
+        """Whether the residual may be only the error of interpolation between the samples.
 
-        It is greatest at the ends of a record, for want of the input beyond them.
+        The ends of the record do not count: the input beyond them is unknown.
         """
         if self.unexplained >= WORTH:
             return False
@@ -117,9 +81,9 @@ class Evidence:
         return float(np.sqrt(np.mean(inner**2))) < INTERPOLATED * float(np.std(moves))
 
     def moved(self, others: Sequence[Mapping[str, float | None]]) -> dict[str, float]:
-        """Figures that others put farther off than an interval can cover, the noise apart.
+        """Figures, except the noise, that other models move farther than an interval can cover.
 
-        Each with the share of itself by which it moves; 0 where one of the others does not give it.
+        Each is given with its relative move, 0 if one of the others lacks it.
         """
         moved = {}
         for name in MODELLED:

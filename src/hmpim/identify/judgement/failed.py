@@ -1,4 +1,4 @@
-"""A check that raises costs itself, and nothing else."""
+"""A check that raises is reported, and the rest of the result stands."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
-    """Return what `look` returns; if it raises, `otherwise` and a finding that says so.
+    """Return what `look` returns; if it raises, return `otherwise` and a finding.
 
     Examples
     --------
@@ -22,12 +22,12 @@ def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Fi
     """
     try:
         return look(), ()
-    except Exception as error:  # whatever it is, the result stands without this check
+    except Exception as error:
         return otherwise, (failed(name, error),)
 
 
 def failed(name: str, error: Exception) -> Finding:
-    """Say which check raised, and what."""
+    """Report which check raised, and what."""
     return Finding(
         code="check_failed",
         message=f"The check {name.replace('_', ' ')!r} failed to run ({type(error).__name__}: "

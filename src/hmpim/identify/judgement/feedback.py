@@ -1,7 +1,6 @@
-"""Whether the input answers the noise: a loop around the unit."""
+"""Whether the input responds to the noise: a feedback loop around the unit."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -19,33 +18,32 @@ from hmpim.record import Finding
 
 __all__ = ["chances_of_an_answer", "feedback"]
 
-
 _AHEAD = 12
-"""Samples of the input's future, and of its past, that are looked at."""
+"""Samples of the input's future, and of its past, that are tested."""
 
 _PAST, _FUTURE = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)
-"""Of the lags behind a constant: it and the past, and the future."""
+"""Rows of a constant with the past of the input, and of its future."""
 
 _AT_ONCE = 20_000
-"""Samples left out whose lags are held at once."""
+"""Missing samples whose lags are in memory at once."""
 
 
 def feedback(evidence: Evidence) -> Iterator[Finding]:
-    """Say that the residual moves the input; a doubt on what it may move where it has a colour.
+    """Say that the residual moves the input; a doubt if the residual is not white.
 
-    A score test (Rao 1948): the input's future, beside its past, explains nothing of a residual
-    that it does not answer. A fit under the noise model of a loop whose noise is white is right
-    all the same (L. Ljung, System Identification, 2nd ed., ch. 13.4).
+    A score test (Rao 1948): without a loop the input's future, in addition to its past, explains
+    nothing of the residual. In a loop with white noise the fit is right all the same (L. Ljung,
+    System Identification, 2nd ed., ch. 13.4).
     """
-    left, u = evidence.readings.innovations, evidence.u
-    if evidence.through or left.size != u.size or u.size < 20 * _AHEAD:
+    residual, u = evidence.readings.innovations, evidence.u
+    if evidence.through or residual.size != u.size or u.size < 20 * _AHEAD:
         return
     if evidence.nonlinear > 0.0 and evidence.unexplained < MOST:
-        return  # a sweep's harmonics are its future
+        return  # a sweep's harmonics resemble its future
     counts = evidence.joint.weighed.counts
     if counts is not None and np.count_nonzero(counts[_AHEAD:-_AHEAD]) < 10 * _AHEAD:
         return
-    if float(chances_of_an_answer(u, left[None], counts)[0]) > FALSE_ALARM:
+    if float(chances_of_an_answer(u, residual[None], counts)[0]) > FALSE_ALARM:
         return
     if find_period(u) is not None:
         return  # the future of a periodic input is its past
@@ -63,17 +61,17 @@ def feedback(evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def chances_of_an_answer(u: Real, left: Real, counts: Mask | None = None) -> Real:
-    """Chance, for each of many residuals, that no answer of the input makes what is seen.
+def chances_of_an_answer(u: Real, residuals: Real, counts: Mask | None = None) -> Real:
+    """Chances, without a loop, of so strong a relation of residuals to the input's future.
 
-    `left`, (k, n), is what models leave over of outputs to the input `u`, (n,), of which all
-    samples count or those of `counts`. 1 where the input's past tells all of its future.
+    The residuals, (k, n), are of outputs to the input, (n,); all samples count, or those of
+    `counts`. The chance is 1 if the input's past determines its future.
     """
     lost = np.flatnonzero([] if counts is None else ~counts[_AHEAD:-_AHEAD])
-    own = _future_of(u, lost)
-    if not own.size.size or not left.shape[0]:
-        return np.ones(left.shape[0])
-    inner = left[:, _AHEAD:-_AHEAD]
+    size, direction, predicted = _future_of(u, lost)
+    if not size.size or not residuals.shape[0]:
+        return np.ones(residuals.shape[0])
+    inner = residuals[:, _AHEAD:-_AHEAD]
     if lost.size:
         inner = inner.copy()
         inner[:, lost] = 0.0
@@ -81,40 +79,31 @@ def chances_of_an_answer(u: Real, left: Real, counts: Mask | None = None) -> Rea
     mean = inner.sum(axis=1) / count
     variance = np.vecdot(inner, inner) / count - mean**2
     moves = u - u.mean()
-    cross = np.stack([np.correlate(moves, one, "valid") for one in inner], axis=1)
+    cross = np.stack([np.correlate(moves, row, "valid") for row in inner], axis=1)
     cross = np.concatenate([inner.sum(axis=1)[None], cross])
-    along = own.direction.T @ (cross[_FUTURE] - own.told.T @ cross[_PAST])
-    gained = np.sum(along**2 / own.size[:, None], axis=0) / variance
-    return np.asarray(scipy.special.chdtrc(own.size.size, gained))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Future:
-    """What an input's future has beside its past: sizes and directions, and what the past tells."""
-
-    size: Real
-    direction: Real
-    told: Real
+    along = direction.T @ (cross[_FUTURE] - predicted.T @ cross[_PAST])
+    explained = np.sum(along**2 / size[:, None], axis=0) / variance
+    return np.asarray(scipy.special.chdtrc(size.size, explained))
 
 
 @kept
-def _future_of(u: Real, lost: NDArray[np.intp]) -> _Future:
+def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
+    """Eigenvalues and vectors of the unpredicted part of the future, and the predictor."""
     gram = _gram(u - u.mean())
     for begin in range(0, lost.size, _AT_ONCE):
-        rows = _lags_at(u - u.mean(), lost[begin : begin + _AT_ONCE])
+        places = lost[begin : begin + _AT_ONCE]
+        lags = (u - u.mean())[places + np.arange(2 * _AHEAD + 1)[:, None]]
+        rows = np.concatenate([np.ones((1, places.size)), lags])
         gram -= rows @ rows.T
-    # Of the future what the past does not tell (a Schur complement).
-    told = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
-    size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ told)
-    seen = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
-    return _Future(size=size[seen], direction=direction[:, seen], told=told)
+    # The Schur complement is the part of the future that the past does not predict.
+    predicted = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
+    size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ predicted)
+    distinct = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
+    return size[distinct], direction[:, distinct], predicted
 
 
 def _gram(u: Real) -> Real:
-    """Products of a constant and an input's lags, past first, over all samples that have them.
-
-    From lag to lag a product of two loses what stands first, and gains what comes behind.
-    """
+    """Products of a constant and an input's lags, past first, over all samples that have them."""
     samples = u.size - 2 * _AHEAD
     head, tail = u[: 2 * _AHEAD], u[samples:]
     gram = np.empty((2 * _AHEAD + 2, 2 * _AHEAD + 2))
@@ -122,13 +111,8 @@ def _gram(u: Real) -> Real:
     gram[0, 2:] = gram[0, 1] + np.cumsum(tail - head)
     gram[1, 1:] = np.correlate(u, u[:samples], "valid")
     gram[1:, :2] = gram[:2, 1:].T
+    # From lag to lag a product gains a term at its end, and loses its first.
     change = np.outer(tail, tail) - np.outer(head, head)
     for k in range(2, gram.shape[0]):
         gram[k, 2:] = gram[k - 1, 1:-1] + change[k - 2]
     return gram
-
-
-def _lags_at(u: Real, places: NDArray[np.intp]) -> Real:
-    """A constant and an input's lags at samples counted from the first that has them."""
-    lags = u[places + np.arange(2 * _AHEAD + 1)[:, None]]
-    return np.concatenate([np.ones((1, places.size)), lags])

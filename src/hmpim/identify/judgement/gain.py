@@ -12,18 +12,16 @@ __all__ = ["gain_change"]
 
 
 def gain_change(evidence: Evidence) -> Iterator[Finding]:
-    """Say that the gain changes; or that it may have, and doubt what would then move.
+    """Say that the gain changes; or that it may have changed, and doubt what would then move.
 
-    A shift smaller than the tolerated error of a model is left to the interval, which covers it.
+    Shifts below the tolerated error of a model raise no doubt: the interval covers them.
     """
     gaining = evidence.gaining
     if gaining is None:
         return
-    way = "rises" if gaining.change > 0.0 else "falls"
-    fs = evidence.fs
-    moved = tuple(
-        evidence.moved([figures_of(fit, fs=fs, highest=fs / 2) for fit in gaining.others])
-    )
+    way, fs = "rises" if gaining.change > 0.0 else "falls", evidence.fs
+    others = [figures_of(fit, fs=fs, highest=fs / 2) for fit in gaining.others]
+    moved = tuple(evidence.moved(others))
     if gaining.share > 2 * FEW:
         moved = (*moved, "noise_std")
     if gaining.taken:

@@ -1,4 +1,4 @@
-"""What lies outside the band, before the record's start or beyond its end."""
+"""Figures outside the band, and motion before the record's start or after its end."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -22,7 +22,6 @@ from hmpim.record import Finding
 from hmpim.record.runs import runs_of
 
 __all__ = [
-    "InputLines",
     "beyond_band",
     "fast_mode",
     "few_lines",
@@ -39,13 +38,13 @@ _LOBE = 4
 """Bins from the middle of a Blackman-Harris window's main lobe to its first zero."""
 
 _SPARE = 2
-"""What lines must tell beyond the figures, for a wrong structure to show."""
+"""Values from lines in excess of the figures, for a wrong structure to show."""
 
 _OF_RATE = 0.4
-"""Share of the rate that a sweep may end at."""
+"""Highest end of a sweep, over the sampling rate."""
 
 _STAMPED_LATE = 5.0
-"""Samples by which a stamp may have an output ahead."""
+"""Samples by which late stamps may put an output ahead."""
 
 _COMPUTED = (
     " Software that computes each output sample from the input sample of the same instant is one "
@@ -53,16 +52,15 @@ _COMPUTED = (
 )
 
 _OF_SLOWEST = ("time_constant", "natural_frequency", "damping_ratio")
-"""What is read off the slowest poles."""
+"""Figures of the slowest poles."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 
 def initial_transient(evidence: Evidence) -> Iterator[Finding]:
-    """Say what was left out because the record does not begin at rest.
+    """Say what is left out because the record does not begin at rest.
 
-    The free response of a slow pole that a plain model lacks looks as a drift does: there the
-    bias is in doubt, and what is read off that pole.
+    A slow free response looks like a drift: the bias and that pole's figures are then in doubt.
     """
     joint, fit = evidence.joint, evidence.joint.best.fit
     if not joint.forgotten:
@@ -98,15 +96,12 @@ def initial_transient(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_have_moved(evidence: Evidence) -> bool:
-    """Whether the output may have moved before the record, and the noise would hide it.
-
-    Until the delay is over it would go on as it does elsewhere.
-    """
+    """Whether the output may have moved before the record, hidden by the noise."""
     u = evidence.u
     if not u.size or not (in_motion(u) or u[0] ** 2 > PART * float(np.mean(u**2))):
         return False
     fit = evidence.joint.best.fit
-    late = int(fit.delay)
+    late = int(fit.delay)  # for so long the motion would go on
     if late < 1:
         return True
     motion = np.mean((fit.prediction[late:] - fit.prediction[:-late]) ** 2)
@@ -115,9 +110,9 @@ def _may_have_moved(evidence: Evidence) -> bool:
 
 
 def fast_mode(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a richer structure with a mode far beyond what was excited.
+    """Doubt a richer structure with a mode far beyond the excited band.
 
-    It stands for something else, and has not described that unless it leaves white noise.
+    The mode imitates something else, successfully only if the residual is white.
     """
     name = evidence.joint.best.fit.structure.name
     if name in PLAIN:
@@ -128,17 +123,16 @@ def fast_mode(evidence: Evidence) -> Iterator[Finding]:
         return
     yield Finding(
         code="extrapolated",
-        message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond "
-        f"the excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be "
-        "constant, or the clocks may drift apart. Check the time stamps, or "
-        f"{_sweep_to(fastest, evidence)}.",
+        message=f"A {structure_in_words(name)} model needs a mode at {fastest:.4g} Hz, beyond the "
+        f"excited band, which ends at {evidence.band[1]:.4g} Hz: the delay may not be constant, "
+        f"or the clocks may drift apart. Check the time stamps, or {_sweep_to(fastest, evidence)}.",
         severity="doubt",
         parameters=evidence.of_other_poles,
     )
 
 
 def natural_frequency_beyond(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a natural frequency that was not excited, and the delay that goes with it."""
+    """Doubt a natural frequency beyond the excited band, and the delay that depends on it."""
     natural = evidence.readings.parameters.natural_frequency
     if natural is None or natural.value <= PAST * evidence.band[1]:
         return
@@ -153,10 +147,7 @@ def natural_frequency_beyond(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _sweep_to(mode: float, evidence: Evidence) -> str:
-    """What shows a mode, in words.
-
-    Half as far again is far enough; of the rate, a sweep may use four tenths.
-    """
+    """The sweep that shows a mode, in words: to 1.5 times its frequency, within 0.4 of the rate."""
     top = round(1.5 * mode, 2 - math.floor(math.log10(1.5 * mode)))
     if top <= _OF_RATE * evidence.fs:
         return f"sweep to {top:.7g} Hz"
@@ -165,7 +156,7 @@ def _sweep_to(mode: float, evidence: Evidence) -> str:
 
 
 def integrator(evidence: Evidence) -> Iterator[Finding]:
-    """Say what an integrating output, or one that forgets a constant input, cannot have."""
+    """Say which figures do not exist for an integrator or a zero at DC."""
     structure = evidence.joint.best.fit.structure
     if structure.dc_zeros:
         yield Finding(
@@ -188,19 +179,19 @@ def integrator(evidence: Evidence) -> Iterator[Finding]:
 def beyond_band(evidence: Evidence) -> Iterator[Finding]:
     """Name the bandwidths that the excited band does not reach."""
     structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
-    asked = ["bandwidth_phase90"]
-    if structure.order > 1:  # a first-order lag alone never gets to -90°
-        asked.append("bandwidth_phase90_without_delay")
+    expected = ["bandwidth_phase90"]
+    if structure.order > 1:  # a first-order lag alone never reaches -90°
+        expected.append("bandwidth_phase90_without_delay")
     if structure.order > 0:
-        asked.append("bandwidth_3db")
-    missing = [name for name in asked if getattr(p, name) is None]
+        expected.append("bandwidth_3db")
+    missing = [name for name in expected if getattr(p, name) is None]
     if structure.integrators or structure.dc_zeros or not missing:
         return
     yield unreached(missing, band_end=evidence.band[1])
 
 
 def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
-    """Name the bandwidths that a band with this end in Hz cannot tell."""
+    """Name the bandwidths that a band with this end in Hz does not reach."""
     return Finding(
         code="beyond_band",
         message=f"Not reached within the excited band, which ends at {band_end:.4g} Hz: "
@@ -212,7 +203,7 @@ def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
 
 
 def short_record(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt what is read off a record that ends before the system has settled."""
+    """Doubt all figures of a record that ends before the system has settled."""
     fit = evidence.joint.best.fit
     settle = (max(fit.delay, 0.0) + fit.memory) / evidence.fs
     length = evidence.joint.problem.y.size / evidence.fs
@@ -228,36 +219,31 @@ def short_record(evidence: Evidence) -> Iterator[Finding]:
 
 
 def negative_delay(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt an output that moves before its input.
+    """Doubt an output that moves before its input, if all models that the record allows agree.
 
-    Only where every model that the record allows says so. By as much as its time constants a lead
-    that no structure has may move it. Further ahead it is the clock, and the figures are those of
-    the record.
+    Dynamics with a lead that no structure has may cause a negative delay up to the time constants.
+    A larger one is due to the clock, and the figures are those of the record.
     """
     delay = evidence.spanned.delay
     latest = None if delay is None or delay.ci95 is None else delay.ci95[1]
     if delay is None or latest is None or latest * evidence.fs >= -ROUNDING:
         return
-    fit = evidence.joint.best.fit
+    best = evidence.joint.best
+    fit = best.fit
     by_a_lead = -fit.delay < max(TWICE * scale_of(fit), _STAMPED_LATE)
+    is_computed = best.intersample == "zoh" and abs(fit.delay + 1.0) < FEW
     yield Finding(
         code="negative_delay",
         message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "
         "input. Check that the input column is not stamped late, and which column is which."
-        + (_COMPUTED if _is_computed(evidence) else ""),
+        + (_COMPUTED if is_computed else ""),
         severity="doubt" if by_a_lead else "info",
         parameters=PHASE_SPLIT if by_a_lead else TIMING,
     )
 
 
-def _is_computed(evidence: Evidence) -> bool:
-    """Whether held samples act one sample early: each at its own instant."""
-    best = evidence.joint.best
-    return best.intersample == "zoh" and abs(best.fit.delay + 1.0) < FEW
-
-
 def _at_the_line(evidence: Evidence) -> str:
-    """Gain and phase at the only line, in a sentence."""
+    """Gain and phase at the only line, in words."""
     power = windowed_power(evidence.u)
     near = int(np.argmax(power)) + np.arange(-3, 4)
     place = float(near @ power[near] / power[near].sum()) * evidence.fs / evidence.u.size
@@ -270,19 +256,16 @@ def _at_the_line(evidence: Evidence) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputLines:
-    """What the spectrum of an input shows: how many frequencies can be told apart.
+    """Properties of an input's spectrum."""
 
-    `octave` and `end` are the mean power of a bin where the last octave begins, and where it ends.
-    """
-
-    count: int
-    octave: float
-    end: float
+    count: int  # distinct frequencies
+    octave: float  # mean power of a bin at the start of the last octave
+    end: float  # mean power of a bin at its end
 
 
 @kept
 def lines_of(u: Real) -> InputLines:
-    """Count the lines of an input, (n,), and take its spectrum's height over the last octave.
+    """Count the lines of an input, (n,), and measure its spectrum at both ends of the last octave.
 
     Examples
     --------
@@ -299,17 +282,16 @@ def lines_of(u: Real) -> InputLines:
 
 
 def few_lines(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a model of more figures than the input's lines can tell.
+    """Doubt a model with more figures than the input's lines can determine.
 
-    A line tells gain and phase where it is, and nothing else. What such a model leaves over is the
-    noise if it is white.
+    A line determines gain and phase at its frequency only. A white residual is still the noise.
     """
     lines = lines_of(evidence.u).count
     fit = evidence.joint.best.fit
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:
         return
-    seen = ("bias", "noise_std") if evidence.readings.white else ("bias",)
+    known = ("bias", "noise_std") if evidence.readings.white else ("bias",)
     yield Finding(
         code="few_lines",
         message=f"The input excites {lines} frequenc{'y' if lines == 1 else 'ies'}, which give "
@@ -317,5 +299,5 @@ def few_lines(evidence: Evidence) -> Iterator[Finding]:
         f"{structure_in_words(fit.structure.name)} model cannot be found from them."
         f"{_at_the_line(evidence) if lines == 1 else ''} Sweep, or add lines.",
         severity="doubt",
-        parameters=tuple(n for n in MODELLED if n not in seen),
+        parameters=tuple(n for n in MODELLED if n not in known),
     )

@@ -1,4 +1,4 @@
-"""What the model leaves over: lack of fit, colour, halves that disagree, noise on the input."""
+"""Checks of the residual: lack of fit, colour, halves that disagree, noise on the input."""
 
 from collections.abc import Iterator
 
@@ -32,24 +32,24 @@ __all__ = [
 ]
 
 _FEWEST = 256
-"""Samples from which the end of an input's spectrum is known."""
+"""Fewest samples that determine the end of an input's spectrum."""
 
 _BINS = 16_384
-"""Frequencies, evenly spread, at which the answer to what is folded is summed."""
+"""Most frequencies, evenly spread, in the sum of the response to aliased input."""
 
 _PARTS = 10
-"""Parts of the record, in which the level of its noise is told."""
+"""Parts of the record for the level of its noise."""
 
 _FAST = 9
-"""Samples over which the size of what is fast in the input is taken."""
+"""Samples over which the size of fast motion of the input is averaged."""
 
 
 def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual still follows the input.
 
-    A doubt on all figures from 3 % of the output on. Where it is a good part of the residual, one
-    on the noise, and on each figure that it may move by a hundredth: at most its deviation, for
-    white noise, times the root of what follows the input over the noise (Cauchy and Schwarz).
+    From 3 % of the output on, all figures are in doubt. If less than that is a large part of the
+    residual, the noise is in doubt, and each figure that may move by 1 %: a figure moves at most by
+    its deviation, for white noise, times the root of this part over the noise (Cauchy-Schwarz).
     """
     misfit = evidence.misfit
     if misfit.probability >= FALSE_ALARM or misfit.share == 0.0:
@@ -57,7 +57,7 @@ def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
     large, moved = owed > TOLERATED, MODELLED
-    much = misfit.share > 2 * FEW  # else the noise would be off by few per cent
+    much = misfit.share > 2 * FEW  # otherwise the noise is off by a few per cent at most
     if much and not large:
         some = owed > WORTH and misfit.share > PART
         moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
@@ -72,15 +72,15 @@ def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
 
 
 def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
-    """Figures that a share of the residual's power may move by a hundredth, and the noise.
+    """The noise, and figures that a share of the residual's power may move by 1 % at most.
 
-    At most, were it along their own slopes.
+    They move most if that part of the residual is along their own derivatives.
     """
     joint = evidence.joint
     count = joint.problem.counted * joint.effective_share
     times = float(np.sqrt(count * share))
     moves = joint.best.fit.prediction
-    # Of statistics there is no prediction.
+    # Statistics have no prediction.
     motion = moves.std() if moves.size else np.sqrt(joint.problem.spread / joint.problem.counted)
     late = FEW / evidence.fs
     rooms = {"noise_std": -np.inf, "bias": MATERIAL * float(motion)}
@@ -96,7 +96,7 @@ def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
 
 
 def coloured_noise(evidence: Evidence) -> Iterator[Finding]:
-    """Say that the residual is not white; a doubt where it is most of the output and follows u."""
+    """Say that the residual is not white; a doubt if it is most of the output and follows u."""
     if evidence.readings.white:
         return
     follows = evidence.misfit.probability < FALSE_ALARM
@@ -112,13 +112,13 @@ def coloured_noise(evidence: Evidence) -> Iterator[Finding]:
 def changing_noise(evidence: Evidence) -> Iterator[Finding]:
     """Say that the noise is louder at some times than at others."""
     weighed, valid = evidence.joint.weighed, evidence.joint.problem.valid
-    left = weighed.as_loud(evidence.readings.innovations)
-    if is_steady(left):
+    noise = weighed.as_loud(evidence.readings.innovations)
+    if is_steady(noise):
         return
-    counted = np.arange(left.size) if valid is None else np.flatnonzero(valid)
+    counted = np.arange(noise.size) if valid is None else np.flatnonzero(valid)
     spans = np.array_split(counted, _PARTS)
-    levels = np.array([float(np.sqrt(np.mean(left[span] ** 2))) for span in spans])
-    levels /= float(np.sqrt(np.mean(left[counted] ** 2)))
+    levels = np.array([float(np.sqrt(np.mean(noise[span] ** 2))) for span in spans])
+    levels /= float(np.sqrt(np.mean(noise[counted] ** 2)))
     loudest = spans[int(np.argmax(levels))]
     first, last = (float(k) / evidence.fs for k in (loudest[0], loudest[-1] + 1))
     yield Finding(
@@ -132,18 +132,16 @@ def changing_noise(evidence: Evidence) -> Iterator[Finding]:
 
 
 def uneven_noise(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt the noise where it grows with what is fast in the input: stamps that jitter.
+    """Doubt the noise if it grows with fast motion of the input, as jittering stamps make it.
 
-    A sample taken late by δ is off by δ times the signal's rate, so that the power of what is left
-    over is a constant and a share of the fast input's; the constant is the noise's.
+    A sample taken late by δ is off by δ times the signal's rate. So the power of the residual is a
+    constant, that of the noise, plus a share of the power of fast motion.
     """
     if not evidence.jittered:
         return
-    residual, u = evidence.joint.best.fit.residual, evidence.u
+    u, valid = evidence.u, evidence.joint.problem.valid
     fast = np.convolve(np.diff(u, 4) ** 2, np.ones(_FAST) / _FAST, mode="full")[2 : 2 + u.size]
-    valid = evidence.joint.problem.valid
-    told = slice(None) if valid is None else valid
-    power, fast = residual[told] ** 2, fast[told]
+    power, fast = _counted(evidence) ** 2, fast if valid is None else fast[valid]
     if power.size < _FAST or np.ptp(power) == 0.0 or np.ptp(fast) == 0.0:
         return
     related = float(np.corrcoef(power, fast)[0, 1])
@@ -164,17 +162,13 @@ def uneven_noise(evidence: Evidence) -> Iterator[Finding]:
 def halves_disagree(evidence: Evidence) -> Iterator[Finding]:
     """Say that the halves of the record do not share the model.
 
-    Of use as `lack_of_fit` is: what models of their own would explain is held against the whole
-    output, and doubts all figures where it is much of it, else those that it may move.
+    As in `lack_of_fit`, all figures are in doubt if models of the halves would explain much more of
+    the output, else those that the difference may move.
     """
-    joint, readings = evidence.joint, evidence.readings
-    weighed = joint.weighed
-    halves = compare_halves(
-        readings.halves,
-        weighed.masked(weighed.y - weighed.counting(weighed.y).mean()),
-        share=joint.weighed_share,
-    )
-    alarm = FALSE_ALARM * joint.weighed_share  # the share of coloured noise is estimated
+    share, weighed = evidence.joint.weighed_share, evidence.joint.weighed
+    output = weighed.masked(weighed.y - weighed.counting(weighed.y).mean())
+    halves = compare_halves(evidence.readings.halves, output, share=share)
+    alarm = FALSE_ALARM * share  # the share of coloured noise is estimated
     if halves.probability >= alarm or halves.owed <= WORTH:
         return
     moved = MODELLED if halves.owed > TOLERATED else ()
@@ -192,11 +186,11 @@ def halves_disagree(evidence: Evidence) -> Iterator[Finding]:
 
 
 def noise_colour_of(evidence: Evidence) -> Iterator[Finding]:
-    """Say what colours a residual that is not white."""
+    """Say which colour a residual has that is not white."""
     if evidence.readings.white:
         return
     colour = noise_colour(_counted(evidence), evidence.fs)
-    if colour.description == "white":  # none of the colours known
+    if colour.description == "white":  # none of the known colours
         return
     yield Finding(
         code="noise_colour",
@@ -208,8 +202,8 @@ def noise_colour_of(evidence: Evidence) -> Iterator[Finding]:
 
 
 def noise_on_the_input(evidence: Evidence) -> Iterator[Finding]:
-    """Say that the input is noisy; a doubt where gains come out too small by a hundredth."""
-    if evidence.limited:  # the corners of what is followed are no noise
+    """Say that the input is noisy; a doubt if gains come out too small by 1 %."""
+    if evidence.limited:  # the corners of a limited command are no noise
         return
     noise = input_noise(evidence.u, evidence.fs, band=evidence.band)
     if noise is None or noise.attenuation <= WORTH:
@@ -225,10 +219,10 @@ def noise_on_the_input(evidence: Evidence) -> Iterator[Finding]:
 
 
 def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt the noise where the input still moves at half the rate, and so beyond it.
+    """Doubt the noise if the input still moves at half the rate, and so beyond it.
 
-    What lies beyond, by the fall of its spectrum over the last octave, is folded into the band and
-    answered there; it is no noise of the sensor.
+    Extrapolation of the spectrum gives the motion beyond. The response to it is aliased into the
+    band, and is not the sensor's noise.
     """
     if evidence.joint.best.intersample != "bandlimited":
         return
@@ -238,9 +232,9 @@ def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
     if not folded.any():
         return
     frequency = np.arange(1, size // 2 + 1, every) / size * evidence.fs
-    answered = np.abs(response(evidence.readings.system, frequency)) ** 2
+    gain = np.abs(response(evidence.readings.system, frequency)) ** 2
     noise = float(np.mean(_counted(evidence) ** 2))
-    share = every * float(folded @ answered) / noise if noise > 0.0 else 0.0
+    share = every * float(folded @ gain) / noise if noise > 0.0 else 0.0
     if share <= 2 * FEW:
         return
     yield Finding(
@@ -254,15 +248,14 @@ def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
 
 
 def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
-    """Power that an input has beyond half the rate, at the frequencies into which it is folded.
+    """Power of an input beyond half the rate, at the frequencies to which it is aliased.
 
-    By the fall of its spectrum over the last octave; all 0 where there is none to be told. Of every
-    so many bins one is returned.
+    The slope of its spectrum over the last octave gives it. One of `every` bins is returned.
     """
     bins = np.arange(1, u.size // 2 + 1, every)
     lines = lines_of(u)
-    told = u.size >= _FEWEST and lines.end > 0.0
-    steep = float(np.log2(lines.octave / lines.end)) if told else 0.0
+    known = u.size >= _FEWEST and lines.end > 0.0
+    steep = float(np.log2(lines.octave / lines.end)) if known else 0.0
     if steep < 1.0:  # as white noise, or none at all
         return np.zeros(bins.size)
     frequency = bins / u.size * fs
@@ -270,6 +263,6 @@ def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
 
 
 def _counted(evidence: Evidence) -> Real:
-    """Residual of the samples that counted."""
+    """Residual at the valid samples."""
     residual, valid = evidence.joint.best.fit.residual, evidence.joint.problem.valid
     return residual if valid is None else residual[valid]

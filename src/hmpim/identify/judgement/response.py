@@ -1,4 +1,4 @@
-"""Bandwidths that measured response and model put apart, and those that a graze leaves open."""
+"""Bandwidths that differ between measured response and model, and ambiguous crossings."""
 
 from collections.abc import Iterator
 
@@ -23,11 +23,11 @@ _SHAPED_BY = {
 """Bandwidths, and the figures that shape the response there."""
 
 _POINTS = 400
-"""Frequencies at which a curve is looked at for turns."""
+"""Frequencies at which a curve is searched for turns."""
 
 
 def _heights(system: RationalDelay, frequency: Real) -> dict[str, Real]:
-    """Height of the response above the level of each bandwidth, the gain as a logarithm."""
+    """Height of phase or log gain above the level of each bandwidth."""
     turned = phase(system, frequency, delay=False) + np.pi / 2
     at_dc = system.numerator[0] / system.denominator[0]
     return {
@@ -38,22 +38,22 @@ def _heights(system: RationalDelay, frequency: Real) -> dict[str, Real]:
 
 
 def bandwidth_disagrees(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt bandwidths apart beyond their error bars, and what of the model shapes them.
+    """Doubt bandwidths that differ beyond their error bars, and the figures that shape them.
 
-    Of an output that is held the measured response shows the hold too: there it says nothing.
+    The measured response of a held output includes the hold and is not compared.
     """
     if evidence.held:
         return
-    one, other = evidence.measured, evidence.readings.parameters
-    apart = [name for name in _SHAPED_BY if are_apart(getattr(one, name), getattr(other, name))]
+    measured, model = evidence.measured, evidence.readings.parameters
+    apart = [n for n in _SHAPED_BY if are_apart(getattr(measured, n), getattr(model, n))]
     if not apart:
         return
     first = apart[0]  # one sentence is enough
     touched = [name for each in apart for name in (each, *_SHAPED_BY[each])]
     yield Finding(
         code="bandwidth_disagrees",
-        message=f"The {in_words(first)} is {getattr(one, first).value:.4g} Hz by the measured "
-        f"response and {getattr(other, first).value:.4g} Hz by the model, further apart than their "
+        message=f"The {in_words(first)} is {getattr(measured, first).value:.4g} Hz by the measured "
+        f"response and {getattr(model, first).value:.4g} Hz by the model, further apart than their "
         "errors allow. Look at the Bode plot there before using either.",
         severity="doubt",
         parameters=tuple(dict.fromkeys(touched)),
@@ -61,10 +61,10 @@ def bandwidth_disagrees(evidence: Evidence) -> Iterator[Finding]:
 
 
 def grazed_bandwidth(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a bandwidth where the curve turns about its level by less than the error there.
+    """Doubt a bandwidth if the curve turns at its level, within the error there.
 
-    A notch takes the phase to -89° and back: whether it crosses -90° is left to the noise, and
-    no error bar at one of the crossings covers the other.
+    A notch may take the phase to -89° and back: noise decides whether it crosses -90°, and the
+    error bar of one crossing does not cover the other.
     """
     structure, p = evidence.joint.best.fit.structure, evidence.readings.parameters
     system = evidence.readings.system
@@ -98,10 +98,7 @@ def grazed_bandwidth(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _nearest_turn(frequency: Real, height: Real, crossing: float) -> float | None:
-    """Frequency at which a curve above its level turns before its crossing, or comes back after.
-
-    None where it does neither, as a curve that falls all the way.
-    """
+    """Frequency at which a curve turns above its level before its crossing, or returns after it."""
     inner = height[1:-1]
     turns = np.flatnonzero((inner <= height[:-2]) & (inner < height[2:])) + 1
     before = [i for i in turns if frequency[i] < crossing]

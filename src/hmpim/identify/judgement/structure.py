@@ -1,4 +1,4 @@
-"""Other numbers of poles that the record does not exclude, and what would change with them."""
+"""Other numbers of poles that the record does not exclude, and the figures that they change."""
 
 from collections.abc import Iterator
 
@@ -14,13 +14,13 @@ from hmpim.record import Finding
 __all__ = ["ALMOST", "barely_told", "missed_pole", "other_order"]
 
 ALMOST = DEVIATIONS - 1.0
-"""Standard deviations from which on another run may ask for other dynamics."""
+"""Standard deviations from which another run may require other dynamics."""
 
 
 def other_order(evidence: Evidence) -> Iterator[Finding]:
     """Name a structure with one more pole that is as likely: the intervals cover it.
 
-    One that the record clearly prefers, but that no model here can be, says that none is right.
+    If the record clearly prefers one that may not be chosen, no model here is right.
     """
     joint = evidence.joint
     if not joint.rivals:
@@ -51,11 +51,10 @@ def _plainer(evidence: Evidence) -> Iterator[Finding]:
     rival = min(rivals, key=lambda trial: trial.criterion).fit
     yield Finding(
         code="structure",
-        message="This record barely distinguishes the "
-        f"{structure_in_words(name)} model from the "
+        message=f"This record barely distinguishes the {structure_in_words(name)} model from the "
         f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
-        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or "
-        "sweep higher, to tell.",
+        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or sweep "
+        "higher, to tell.",
         severity="info",
         parameters=PHASE_SPLIT,
     )
@@ -79,26 +78,26 @@ def _poles(order: int) -> str:
 
 
 def missed_pole(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt the delay where the record asks for other dynamics, or cannot exclude a slow pole.
+    """Doubt the delay if the record requires other dynamics, or cannot exclude a slow pole.
 
-    A statistic within one deviation of its level may fall on the other side of it in another run:
-    that is said on both sides.
+    A statistic within one deviation of its level may be on the other side of it in another run; the
+    finding says so on both sides.
     """
     hidden = evidence.joint.hidden
-    bent = evidence.nonlinear > MOST  # that of what is left asks for no pole
+    bent = evidence.nonlinear > MOST  # a nonlinear residual requires no pole
     if hidden is None or bent or evidence.joint.rivals:
         return
-    order, fs = evidence.joint.best.fit.structure.order, evidence.fs
+    poles, fs = _poles(evidence.joint.best.fit.structure.order), evidence.fs
     moved = float(np.sqrt(abs(hidden.squared)))
-    asked = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
-    may_turn = abs(asked - DEVIATIONS) < DEVIATIONS - ALMOST
-    close = "Another run may give the opposite verdict. " if may_turn else ""
+    statistic = abs(hidden.squared) / hidden.std if hidden.std > 0.0 else 0.0
+    is_close = abs(statistic - DEVIATIONS) < DEVIATIONS - ALMOST
+    close = "Another run may give the opposite verdict. " if is_close else ""
     level = (
-        f"the evidence is {asked:.1f} standard deviations, and a doubt begins at {DEVIATIONS:.1f}"
+        f"the evidence is {statistic:.1f} standard deviations, and a doubt begins at "
+        f"{DEVIATIONS:.1f}"
     )
-    poles = _poles(order)
     matters = moved > TOLERATED * hidden.scale
-    if asked > DEVIATIONS and matters:
+    if statistic > DEVIATIONS and matters:
         yield Finding(
             code="other_dynamics",
             message=f"The record requires dynamics other than {poles}: {level}. The delay "

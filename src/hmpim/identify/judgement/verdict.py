@@ -15,18 +15,18 @@ from hmpim.identify.result.estimate import ParameterVerdict
 from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
 
-__all__ = ["UNTOLD", "all_doubted", "doubted", "judged", "judged_together", "unfollowed"]
+__all__ = ["UNKNOWN", "all_doubted", "doubted", "judged", "judged_together", "unfollowed"]
 
 H = TypeVar("H", Parameters, ResponseBandwidths)
 
 _NOTHING = frozenset({"dead_channel", "unrelated"})
-"""Codes of a pair whose output does not follow its input at all."""
+"""Codes of a pair whose output does not follow its input."""
 
 _OF_THE_RECORD = frozenset(
     {"bandwidth_disagrees", "frozen", "halves_disagree", "nonlinear", "quantization", "spikes"}
     | _NOTHING
 )
-"""Codes of doubts that the measured response shares; the others are about the model."""
+"""Codes of doubts that concern the measured response too; the others concern the model."""
 
 _WITHHELD = frozenset(
     {
@@ -41,54 +41,58 @@ _WITHHELD = frozenset(
         "unsampled_input",
     }
 )
-"""Codes of doubts under which a figure's error is not known: its interval is withheld.
+"""Codes of doubts under which a figure's error is unknown: its interval is withheld.
 
-Either the record contradicts the model itself, or what noise cannot do to the figure something else
-does (a slow free response to the bias, motion between the samples to the noise). Intervals made
-with such a model held in about half of the study of families; what noise alone does to the figure
-is known all the same."""
+Either the record contradicts the model itself, or something other than noise moves the figure (a
+slow free response the bias, motion between the samples the noise). In the study of families about
+half of the intervals of such a model held. The deviation due to noise alone is still known."""
 
-UNTOLD = frozenset({"few_lines"})
-"""Those under which that is not known either."""
+UNKNOWN = frozenset({"few_lines"})
+"""Codes of doubts under which the deviation due to noise is unknown too."""
 
 
 def judged(pair: PairIdentification) -> PairIdentification:
-    """Return the pair with the verdicts that its findings ask for; those it has do not count.
+    """Return the pair with the verdicts that follow from its findings; its old ones are ignored.
 
     A parameter is doubtful if a doubt names it, or if its interval is withheld. The pair is not
     identifiable if its output does not follow its input; else it is ok if every figure given is.
     """
-    names = doubted(pair.warnings)
-    unknown = doubted(w for w in pair.warnings if w.code in _WITHHELD)
-    untold = doubted(w for w in pair.warnings if w.code in UNTOLD)
-    parameters = _all_weighed(_withheld(pair.parameters, unknown, untold), names)
-    shared = doubted(w for w in pair.warnings if w.code in _OF_THE_RECORD)
-    return replace(
-        pair,
-        parameters=parameters,
-        from_response=_all_weighed(pair.from_response, shared),
-        verdict=_verdict(parameters, pair.warnings),
+    withheld, unknown, shared = (
+        doubted(finding for finding in pair.warnings if finding.code in codes)
+        for codes in (_WITHHELD, UNKNOWN, _OF_THE_RECORD)
     )
+    intervals = {
+        name: replace(e, std=None if name in unknown else e.spread, ci95=None)
+        for name in withheld
+        if (e := getattr(pair.parameters, name)) is not None
+    }
+    parameters = _all_weighed(replace(pair.parameters, **intervals), doubted(pair.warnings))
+    given = (getattr(parameters, name) for name in EVERY)
+    verdict: Verdict = "ok" if all(e is None or e.verdict == "ok" for e in given) else "doubtful"
+    if any(finding.code in _NOTHING for finding in pair.warnings):
+        verdict = "not_identifiable"
+    response = _all_weighed(pair.from_response, shared)
+    return replace(pair, parameters=parameters, from_response=response, verdict=verdict)
 
 
 def judged_together(
     mean: Estimate, parts: Iterable[Estimate], *, name: str, findings: Iterable[Finding] = ()
 ) -> Estimate:
-    """Return the mean of estimates of one parameter with its verdict: doubtful if any of them is.
+    """Return the mean of estimates of one parameter, doubtful if any of them is.
 
-    `findings` is what is said of all of them together.
+    `findings` concern all of them together.
     """
     doubtful = name in doubted(findings) or any(part.verdict == "doubtful" for part in parts)
     return _weighed(mean, doubtful=doubtful)
 
 
 def all_doubted(parameters: Parameters) -> Parameters:
-    """Return the parameters with a doubt on each: nothing is claimed yet."""
+    """Return the parameters, all of them doubtful."""
     return _all_weighed(parameters, frozenset(EVERY))
 
 
 def unfollowed(output: str, source: str) -> Finding:
-    """Say that an output does not follow the one input there is."""
+    """Report that an output does not follow the only input."""
     return Finding(
         code="unrelated",
         message=f"Output {output!r} does not follow input {source!r}: a constant explains it as "
@@ -99,7 +103,7 @@ def unfollowed(output: str, source: str) -> Finding:
 
 
 def doubted(findings: Iterable[Finding]) -> frozenset[str]:
-    """Return the names of all parameters that a doubt touches.
+    """Return the names of all parameters in doubt.
 
     Examples
     --------
@@ -113,22 +117,10 @@ def doubted(findings: Iterable[Finding]) -> frozenset[str]:
 
 
 def _all_weighed(holder: H, names: frozenset[str]) -> H:
-    """Weigh every estimate that is there."""
+    """Give every estimate its verdict."""
     given = {f.name: e for f in fields(holder) if (e := getattr(holder, f.name)) is not None}
     return replace(
         holder, **{name: _weighed(e, doubtful=name in names) for name, e in given.items()}
-    )
-
-
-def _withheld(parameters: Parameters, names: frozenset[str], untold: frozenset[str]) -> Parameters:
-    """Take the intervals away whose figures are named, and the deviations of those untold."""
-    given = {name: e for name in names if (e := getattr(parameters, name)) is not None}
-    return replace(
-        parameters,
-        **{
-            name: replace(e, std=None if name in untold else e.spread, ci95=None)
-            for name, e in given.items()
-        },
     )
 
 
@@ -136,10 +128,3 @@ def _weighed(estimate: Estimate, *, doubtful: bool) -> Estimate:
     withheld = estimate.ci95 is None
     verdict: ParameterVerdict = "doubtful" if doubtful or withheld else "ok"
     return estimate if estimate.verdict == verdict else replace(estimate, verdict=verdict)
-
-
-def _verdict(parameters: Parameters, findings: Iterable[Finding]) -> Verdict:
-    if any(finding.code in _NOTHING for finding in findings):
-        return "not_identifiable"
-    given = (getattr(parameters, name) for name in EVERY)
-    return "ok" if all(e is None or e.verdict == "ok" for e in given) else "doubtful"

@@ -1,11 +1,12 @@
-"""Nonlinearity: what follows the input but no linear model.
+"""Nonlinearity: what follows the input but no linear model can produce.
 
 nonlinearity          the inspection of one fit, and its summary
-harmonics             harmonics that follow a sweep, odd and even
+harmonics             even and odd harmonics that follow a sweep
 sweep_phase           the phase of a sweep, from its samples
-harmonic_regression   the regression behind them
-lines                 lines of a periodic input left out
+harmonic_regression   the regression on these harmonics
+lines                 distortion at the unexcited lines of a periodic input
 mechanisms            friction, backlash, rate limit, hard and soft springs
-evidence              which of them the record speaks for
+evidence              which of them the record supports
 bends                 how far a nonlinearity moves a linear fit
+speed                 a command that is followed at a limited speed
 """

@@ -1,12 +1,11 @@
 """By how much a nonlinearity may have moved the figures of a linear fit.
 
-A linear fit takes up what of a nonlinearity looks linear: a row left out of a regression moves its
-other weights by their regression on that row (H. Theil, Rev. Int. Statist. Inst. 25, 1957). So each
-kind's trace (`hmpim.identify.nonlinear.mechanisms`, and at the input a dead zone and a limit of
-speed, seen through the model) stands as one more row beside the fit's derivatives, with noise that
-is an autoregression. Whether it belongs there is a score test (C. R. Rao, Proc. Cambridge Phil.
-Soc. 44, 1948), of any input, by what it leaves at the input's own frequency and beside it; how far
-the fit moves with it follows from the same regression.
+A linear fit absorbs the part of a nonlinearity that looks linear: a row missing from a regression
+moves the other weights by their regression on that row (H. Theil, Rev. Int. Statist. Inst. 25,
+1957). So each kind's trace in the output is added as one more row to the fit's derivatives, in
+autoregressive noise. The kinds are those of `hmpim.identify.nonlinear.mechanisms`, and a dead zone
+and a rate limit at the input. A score test decides whether the row belongs there (C. R. Rao, Proc.
+Cambridge Phil. Soc. 44, 1948), for any input; the same regression gives how far the fit moves.
 """
 
 from collections.abc import Iterator
@@ -42,92 +41,57 @@ from hmpim.record import Intersample
 __all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead", "plainer_bends"]
 
 _EVERY = 3
-"""Of a kind's values every so many is tried: its neighbours leave traces that are much alike."""
+"""Every third of a kind's values is tried: neighbouring values leave very similar traces."""
 
 _DEAD = (0.02, 0.1, 0.4)
-"""Half widths of a dead zone tried, over the largest input."""
+"""Half widths tried for a dead zone, over the largest input."""
 
 _ALIKE = 1e-8
-"""Share of a trace's power that must be left beside what a linear change explains."""
+"""Least share of a trace's power that linear changes must leave unexplained."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bend:
-    """One kind of nonlinearity that the record leaves in question.
-
-    Parameters
-    ----------
-    kind : str
-        Name as in `hmpim.identify.nonlinear.mechanisms`.
-    gain : float
-        Log-likelihood that it brings.
-    certain : bool
-        Whether the likeliest kind brings more than a linear unit's record would by chance.
-    effect : float
-        R.m.s. of all it does, over that of the output about its mean.
-    share : float
-        Share of the residual's power that it explains.
-    white : bool
-        Whether the likeliest kind leaves white noise.
-    fit : Fit
-        The linear fit beside which it stands.
-    moved : ndarray, shape (p,)
-        What it adds to the parameters of that fit: `theta`, then `linear`.
-    """
+    """One kind of nonlinearity that the record does not exclude."""
 
     kind: Kind
-    gain: float
-    certain: bool
-    effect: float
-    share: float
-    white: bool
-    fit: Fit
-    moved: Real
+    gain: float  # log-likelihood that it gains
+    certain: bool  # whether the likeliest kind gains more than a linear unit would by chance
+    effect: float  # r.m.s. of its whole effect, over that of the output about its mean
+    share: float  # share of the residual's power that it explains
+    white: bool  # whether the residual is white without the likeliest kind
+    fit: Fit  # the linear fit to which it is added
+    moved: Real  # (p,): its effect on the parameters of that fit, `theta`, then `linear`
 
     @property
     def matters(self) -> bool:
-        """Whether it is there, and worth a word."""
+        """Whether it exists, and is worth a word."""
         return self.certain and self.effect > WORTH
 
     @property
     def counts(self) -> bool:
-        """Whether it is there, and too large, or too little of it known, for an interval.
+        """Whether it exists, and is too large or too poorly known for an interval.
 
-        All is known where it leaves noise beside a plain structure; a rich one may have been taken
-        for its sake.
+        It is well known if a plain structure with it leaves white noise; a rich structure may have
+        been chosen only to imitate it.
         """
         known = self.white and self.fit.structure.name in PLAIN
         return self.certain and self.effect > (MATERIAL if known else WORTH)
 
     @property
     def farthest(self) -> Real:
-        """What it adds at most: its weight is known as well as its likelihood says."""
+        """The most that it adds: its likelihood determines the error of its weight."""
         return np.asarray(self.moved * (1.0 + HALF / np.sqrt(2.0 * self.gain)))
 
 
 def bends(
     u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float, floor: float = 0.0
 ) -> tuple[Bend, ...]:
-    """Find the kinds of nonlinearity that the record leaves in question, the likeliest first.
+    """Find the kinds of nonlinearity that the record does not exclude, the likeliest first.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input samples.
-    problem, fit
-        The data with the noise as they were weighed, and the linear fit.
-    intersample : str
-        What the input does between its samples.
-    fs : float
-        Rate in Hz.
-    floor : float
-        R.m.s. up to which nothing is said, in the output's unit: the error of rounding.
-
-    Returns
-    -------
-    tuple of Bend
-        Empty where the odds for the likeliest are below 400 to 1; else every one that explains
-        nearly as much, for no trace is exact.
+    None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
+    nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
+    its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding.
 
     Examples
     --------
@@ -146,18 +110,16 @@ def bends(
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
     tried = _tried(u, fit, intersample, fs)
-    traces = np.stack([one.trace for one in tried])
-    if problem.valid is not None:  # a trace that lies elsewhere is but rounding where they count
-        there = traces[:, problem.valid]
-        traces[np.vecdot(there, there) <= _ALIKE * np.vecdot(traces, traces)] = 0.0
+    traces = np.stack([hypothesis.trace for hypothesis in tried])
+    if problem.valid is not None:  # a trace outside the valid samples is only rounding inside
+        inside = traces[:, problem.valid]
+        traces[np.vecdot(inside, inside) <= _ALIKE * np.vecdot(traces, traces)] = 0.0
     rows = jacobian(problem, fit, *traces)
     residual = problem.innovations(fit.prediction, fit.residual)
     if problem.counts is not None:
         rows, residual = rows[:, problem.counts], residual[problem.counts]
-    slopes, seen = np.split(rows, [rows.shape[0] - len(tried)])
-    weights, gains, rest = _scored(slopes, seen, residual)
-    if not np.any(gains[weights > 0.0] > CLEARLY):
-        return ()
+    slopes, filtered = np.split(rows, [-len(tried)])
+    weights, gains, rest = _scored(slopes, filtered, residual)
     sizes = np.std(traces, axis=1)
     gains = np.where(weights * sizes > floor, gains, 0.0)
     most = float(gains.max())
@@ -175,7 +137,7 @@ def bends(
             share=-float(np.expm1(-2.0 * gains[i] / residual.size)),
             white=white,
             fit=given,
-            moved=-solved(gram, slopes @ seen[i] * weights[i]),
+            moved=-solved(gram, slopes @ filtered[i] * weights[i]),
         )
         for i in np.argsort(-gains)
         if gains[i] > most - max(CLEARLY, PART * most)
@@ -192,12 +154,11 @@ def is_bent_instead(
     fs: float,
     floor: float = 0.0,
 ) -> bool:
-    """Whether a plain fit and one nonlinearity explain more than a rich fit, with its own or none.
+    """Whether a plain fit with one nonlinearity explains more than a rich fit, with or without one.
 
-    A spring that hardens is described better by a second mode than by none. All else is as for
-    `bends`.
+    A second mode may imitate a hardening spring. The other arguments are as for `bends`.
     """
-    if fit.cost < PART * plain.cost:  # no kind makes that up
+    if fit.cost < PART * plain.cost:  # no kind explains as much
         return False
     bent = bends(u, problem, plain, intersample=intersample, fs=fs, floor=floor)
     if not bent or not bent[0].certain or fit.cost <= 0.0:
@@ -212,43 +173,43 @@ def is_bent_instead(
 def plainer_bends(
     u: Real, joint: JointFit, plain: Fit | None, *, fs: float, floor: float = 0.0
 ) -> tuple[Bend, ...]:
-    """Find the kinds beside which a plain fit is about as likely as the rich one chosen.
+    """Find the kinds that make a plain fit about as likely as the rich one chosen.
 
-    Both are to the same data; without a plain one there is nothing to find.
+    Both fit the same data; without a plain fit nothing is found.
     """
     best, problem = joint.best, joint.weighed
     if plain is None or plain.structure.parameters >= best.fit.structure.parameters:
         return ()
     plain = polished(problem, plain)
-    if best.fit.objective < PART * plain.objective:  # no kind makes that up
+    if best.fit.objective < PART * plain.objective:  # no kind explains as much
         return ()
     count = problem.counted * joint.weighed_share
     fewer = best.fit.structure.parameters - plain.structure.parameters - 1
     behind = count * np.log(plain.objective / best.fit.objective) - fewer * np.log(count)
     found = bends(u, problem, plain, intersample=best.intersample, fs=fs, floor=floor)
     return tuple(
-        replace(one, white=False) for one in found if behind - 2.0 * one.gain < 2.0 * CLEARLY
+        replace(bend, white=False) for bend in found if behind - 2.0 * bend.gain < 2.0 * CLEARLY
     )
 
 
 def bent_shapes(
     u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float
 ) -> Real:
-    """Traces of all kinds beside a fit in white noise, less what a linear change explains, (k, n).
+    """Traces of all kinds in white noise, less what a linear change of the fit explains, (k, n).
 
-    Each has a sum of squares of 1, so that half the square of its product with a residual of unit
-    variance is the log-likelihood that it brings, where the product is above 0.
+    Each has a sum of squares of 1. Half the square of its product with a residual of unit variance
+    is the log-likelihood that it gains, if the product is positive.
     """
-    traces = np.stack([one.trace for one in _tried(u, fit, intersample, fs)])
+    traces = np.stack([hypothesis.trace for hypothesis in _tried(u, fit, intersample, fs)])
     slopes = jacobian(problem, fit)
-    beside = traces - traces @ np.linalg.pinv(slopes) @ slopes
-    power = np.vecdot(beside, beside)
-    told = power > _ALIKE * np.vecdot(traces, traces)
-    return np.asarray(beside[told] / np.sqrt(power[told, None]))
+    rest = traces - traces @ np.linalg.pinv(slopes) @ slopes
+    power = np.vecdot(rest, rest)
+    distinct = power > _ALIKE * np.vecdot(traces, traces)
+    return np.asarray(rest[distinct] / np.sqrt(power[distinct, None]))
 
 
 def _tried(u: Real, fit: Fit, intersample: Intersample, fs: float) -> list[Hypothesis]:
-    """Every kind with the values that are tried."""
+    """Every kind, with the values to try."""
     return [
         *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
         *_at_the_input(u, fit, intersample, fs),
@@ -258,7 +219,7 @@ def _tried(u: Real, fit: Fit, intersample: Intersample, fs: float) -> list[Hypot
 def _shortened(
     u: Real, problem: Problem, fit: Fit, intersample: Intersample
 ) -> tuple[Real, Problem, Fit]:
-    """The stretch of a long record with most to explain; it begins in mid-motion."""
+    """The stretch of a long record with the largest residual; it begins in mid-motion."""
     here = stretch_of(fit.residual)
     if here == slice(0, u.size):
         return u, problem, fit
@@ -282,13 +243,13 @@ def _shortened(
 
 
 def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Iterator[Hypothesis]:
-    """What a dead zone or a limited speed of the command leaves behind the model."""
+    """Traces in the output of a dead zone or a rate limit of the command."""
     largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
     inside = [-np.clip(u, -half * largest, half * largest) for half in _DEAD]
     rates = RATES[_EVERY::2]
     bent = np.stack([*inside, *(rate_limited(u, rate * fastest) - u for rate in rates)])
     first = bent[:, :1]
-    # A trace is told from noise, not measured: its spline need be no finer than the samples.
+    # A trace is only detected, not measured: its spline need be no finer than the samples.
     source = prepare_input(bent - first, intersample, precision=np.inf)
     traces = rational_response(
         source, delay=fit.delay, numerator=fit.numerator, denominator=fit.denominator
@@ -301,36 +262,35 @@ def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Ite
         yield Hypothesis(kind="rate_limit", trace=trace, size=rate * fastest * fs)
 
 
-def _scored(slopes: Real, seen: Real, residual: Real) -> tuple[Real, Real, Real]:
-    """Weight of each trace beside the slopes, what it gains, and what the best leaves."""
-    weights, gains, basis = _regressed(slopes, seen, residual, np.ones(1))
+def _scored(slopes: Real, traces: Real, residual: Real) -> tuple[Real, Real, Real]:
+    """Weight and gain of each trace in addition to the slopes, and the residual of the best."""
+    weights, gains, basis = _regressed(slopes, traces, residual)
     best = int(np.argmax(gains))
-    rest = residual - weights[best] * seen[best]
+    rest = residual - weights[best] * traces[best]
     rest -= basis @ (rest @ basis)
     colour, _ = yule_walker(rest, LONGEST_AUTOREGRESSION)
     if colour.size > 1:
-        weights, gains, _ = _regressed(slopes, seen, residual, colour)
+        rows = scipy.signal.lfilter(colour, [1.0], np.vstack([slopes, traces, residual]), axis=1)
+        slopes, traces, residual = np.split(rows, [len(slopes), -1])
+        weights, gains, _ = _regressed(slopes, traces, residual[0])
     return weights, gains, rest
 
 
-def _regressed(slopes: Real, seen: Real, residual: Real, colour: Real) -> tuple[Real, Real, Real]:
-    """The same in noise of one colour; and a basis of what the slopes explain, shape (n, k)."""
-    if colour.size > 1:
-        rows = scipy.signal.lfilter(colour, [1.0], np.vstack([slopes, seen, residual]), axis=1)
-        slopes, seen, residual = rows[: slopes.shape[0]], rows[slopes.shape[0] : -1], rows[-1]
+def _regressed(slopes: Real, traces: Real, residual: Real) -> tuple[Real, Real, Real]:
+    """Weights and gains in white noise, and a basis of what the slopes explain, shape (n, k)."""
     size = np.sqrt(np.vecdot(slopes, slopes))
     q, r = np.linalg.qr((slopes / np.where(size > 0.0, size, 1.0)[:, None]).T)
     q = q[:, np.abs(np.diag(r)) > _ALIKE]
-    # Of trace and residual what the slopes leave of them, which need not be made itself.
-    along, own = seen @ q, residual @ q
-    whole = np.vecdot(seen, seen)
+    # Products of the parts that the slopes do not explain, without forming these parts.
+    along, own = traces @ q, residual @ q
+    whole = np.vecdot(traces, traces)
     power = whole - np.vecdot(along, along)
-    told = power > _ALIKE * whole
-    product = seen @ residual - along @ own
-    weights = np.where(told, product, 0.0) / np.where(told, power, 1.0)
+    distinct = power > _ALIKE * whole
+    product = traces @ residual - along @ own
+    weights = np.where(distinct, product, 0.0) / np.where(distinct, power, 1.0)
     total = float(residual @ residual - own @ own)
     freedom = max(residual.size - q.shape[1], 1)
     if total <= 0.0:
         return weights, np.zeros(weights.size), q
-    taken = np.minimum(weights**2 * power / total, 1.0 - np.finfo(float).eps)
-    return weights, -0.5 * freedom * np.log1p(-np.where(told, taken, 0.0)), q
+    explained = np.minimum(weights**2 * power / total, 1.0 - np.finfo(float).eps)
+    return weights, -0.5 * freedom * np.log1p(-np.where(distinct, explained, 0.0)), q

@@ -1,8 +1,8 @@
-"""What a sweep's harmonics, lines left out, or traces say of one linear fit.
+"""What a sweep's harmonics, unexcited lines, or traces show about one linear fit.
 
-Evidence first: harmonics that no noise makes, lines that no linear system answers, traces that
-bring likelihood. Then which kinds are left in question, and whether a plainer linear structure
-with one kind beside it says more than a rich one alone.
+The evidence comes first: harmonics above the noise, output at lines that the input does not excite,
+traces that gain likelihood. Then come the kinds that remain possible, and the question whether a
+plainer linear structure with one kind explains more than a rich one alone.
 """
 
 from dataclasses import dataclass, replace
@@ -20,123 +20,111 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, co
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
-__all__ = ["Look", "Seen", "are_curved", "look_at", "plainer_of", "thinned"]
+__all__ = ["Outcome", "Subject", "are_curved", "better_of", "inspect_fit", "thinned"]
 
 _BLOCK = 16_384
-"""Samples whose products are summed at once: as many as fit into a processor's cache."""
+"""Samples whose products are summed at once: they fit into a processor's cache."""
 
 _GAIN = searched(36)
-"""Log-likelihood that a trace must bring; in linear systems the best of all reaches 7."""
+"""Log-likelihood that a trace must gain; in linear systems the best one reaches 7."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Look:
-    """The record as it is looked at: in blocks of samples if it is long."""
+class Subject:
+    """The record under test, averaged in blocks of samples if it is long."""
 
-    u: Real
+    u: Real  # (n,): input
     problem: Problem
-    fs: float
-    others: tuple[Real, ...]
-    sweep: SweepPhase | None
-    block: int
+    fs: float  # Hz
+    others: tuple[Real, ...]  # other inputs that drove the output at the same time
+    sweep: SweepPhase | None  # of the averaged input, if that is a sweep
+    block: int  # samples per block
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Seen:
-    """What the tests gave for one linear fit, before it is weighed."""
+class Outcome:
+    """Results of the tests of one linear fit."""
 
     fit: Fit
     harmonics: Harmonics | None = None
     lines: tuple[LineLevel, ...] = ()
-    mechanisms: tuple[Mechanism, ...] = ()
-    named: tuple[Mechanism, ...] = ()
-    rms: float = 0.0
+    mechanisms: tuple[Mechanism, ...] = ()  # the likeliest first
+    named: tuple[Mechanism, ...] = ()  # those of them that remain possible
+    rms: float = 0.0  # of the nonlinear part, in the output's unit
 
     @property
     def effect(self) -> float:
-        """R.m.s. of all that the likeliest kind does, where harmonics vouch for its size."""
+        """R.m.s. of the whole effect of the likeliest kind, if harmonics determine its size."""
         if self.harmonics is None or not self.named:
             return self.rms
         return max(self.rms, self.named[0].effect)
 
 
 def thinned(x: Real, block: int) -> Real:
-    """Means over blocks of samples; an incomplete one at the end is left out."""
-    if block == 1:
-        return x
+    """Means over blocks of samples; an incomplete last one is omitted."""
     return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
-def look_at(look: Look, fit: Fit) -> Seen:
-    """All tests that the input allows; a quick look first if the residual is white."""
-    counted = slice(None) if look.problem.valid is None else look.problem.valid
+def inspect_fit(subject: Subject, fit: Fit) -> Outcome:
+    """Make all tests that the input allows; a white residual gets a quick test first."""
+    counted = slice(None) if subject.problem.valid is None else subject.problem.valid
     white = is_white(fit.residual[counted])
-    if look.sweep is not None:
-        return _by_harmonics(look, look.sweep, fit, white)
-    return Seen(fit=fit) if look.others else _by_traces(look, fit, white)
+    if subject.sweep is not None:
+        return _by_harmonics(subject, subject.sweep, fit, white)
+    return Outcome(fit=fit) if subject.others else _by_traces(subject, fit, white)
 
 
-def _by_harmonics(look: Look, sweep: SweepPhase, fit: Fit, white: bool) -> Seen:
-    """Ask a sweep for its harmonics, and which kind makes them."""
-    residual = thinned(fit.residual, look.block)
-    rate, delay = look.fs / look.block, fit.delay / look.fs
+def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) -> Outcome:
+    """Measure the harmonics of a sweep, and find the kinds that may make them."""
+    residual = thinned(fit.residual, subject.block)
+    rate, delay = subject.fs / subject.block, fit.delay / subject.fs
     if (
         white
         and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM
-        and not _curved(fit, look.problem)
+        and not _curved(fit, subject.problem)
     ):
-        return Seen(fit=fit)
-    phases = [sweep_phase(thinned(other, look.block), rate) for other in look.others]
+        return Outcome(fit=fit)
+    phases = [sweep_phase(thinned(other, subject.block), rate) for other in subject.others]
     others = [phase for phase in phases if phase is not None]
     harmonics = sweep_harmonics(residual, sweep, rate, delay=delay, others=others)
     if harmonics is None:
-        return Seen(fit=fit)
-    harmonics = _within(harmonics, float(np.sqrt(np.mean(residual**2))))
+        return Outcome(fit=fit)
+    # No order exceeds the whole residual: if few samples count, orders may cancel each other.
+    most = float(np.sqrt(np.mean(residual**2)))
+    orders = tuple(replace(order, rms=min(order.rms, most)) for order in harmonics.orders)
+    harmonics = replace(harmonics, orders=orders)
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
-    told = bool(parts) or harmonics.regression.evidence > LIKELIER
-    if told and not look.others and np.ptp(fit.prediction) > 0:
-        powers = np.arange(fit.denominator.size)
-        kinds = compare_harmonics(
-            harmonics.regression,
-            thinned(fit.prediction - fit.linear[-1], look.block),
-            fit.denominator / float(look.block) ** powers,
-            fs=rate,
-        )
+    significant = bool(parts) or harmonics.regression.evidence > LIKELIER
+    if significant and not subject.others and np.ptp(fit.prediction) > 0:
+        model = thinned(fit.prediction - fit.linear[-1], subject.block)
+        denominator = fit.denominator / float(subject.block) ** np.arange(fit.denominator.size)
+        kinds = compare_harmonics(harmonics.regression, model, denominator, fs=rate)
     named = _likely(kinds, harmonics.regression.evidence)
     if not parts and not named:
-        return Seen(fit=fit, harmonics=harmonics)
+        return Outcome(fit=fit, harmonics=harmonics)
     rms = float(np.sqrt(np.sum(np.square(parts)))) if parts else named[0].rms
-    return Seen(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
+    return Outcome(fit=fit, harmonics=harmonics, mechanisms=kinds, named=named, rms=rms)
 
 
-def _within(harmonics: Harmonics, most: float) -> Harmonics:
-    """Limit each order to all there is: where few samples count, orders may cancel each other."""
-    if all(order.rms <= most for order in harmonics.orders):
-        return harmonics
-    return replace(
-        harmonics,
-        orders=tuple(replace(order, rms=min(order.rms, most)) for order in harmonics.orders),
-    )
-
-
-def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
-    """Ask lines left out, if the input repeats, and whether any kind explains the residual."""
-    lines = _lines(look.u, look.problem)
+def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
+    """Test unexcited lines, if the input repeats, and whether any kind explains the residual."""
+    u, problem = subject.u, subject.problem
+    period = find_period(u)
+    lines: tuple[LineLevel, ...] = ()
+    if period is not None and problem.valid is None and u.size >= 3 * period:
+        lines = detection_lines(u[period:], problem.y[period:], period=period)  # after transients
     levels = [v for v in lines if v.probability < FALSE_ALARM]
-    if white and not levels and not _curved(fit, look.problem):
-        return Seen(fit=fit, lines=lines)
-    power = fit.cost / max(look.problem.counted, 1)
+    if white and not levels and not _curved(fit, problem):
+        return Outcome(fit=fit, lines=lines)
+    power = fit.cost / max(problem.counted, 1)
     least = 0.0
-    if not white:  # dynamics left out resemble every kind a little, more so at few lines
-        least = power * (PART if find_period(look.u) is None else MOST)
-    found = tuple(
-        m
-        for m in compare_mechanisms(look.problem, fit, fs=look.fs)
-        if m.gain > _GAIN and m.rms**2 > least
-    )
+    if not white:  # missing dynamics resemble every kind a little, more so with few lines
+        least = power * (PART if period is None else MOST)
+    kinds = compare_mechanisms(problem, fit, fs=subject.fs)
+    found = tuple(m for m in kinds if m.gain > _GAIN and m.rms**2 > least)
     distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
-    return Seen(
+    return Outcome(
         fit=fit,
         lines=lines,
         mechanisms=found,
@@ -146,10 +134,7 @@ def _by_traces(look: Look, fit: Fit, white: bool) -> Seen:
 
 
 def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, ...]:
-    """The kinds that the record leaves in question; one of them, if it tells which.
-
-    `evidence` is the log-likelihood that all harmonics gain beyond what noise would.
-    """
+    """The kinds that remain possible; `evidence` is what all harmonics gain above noise."""
     if not kinds or kinds[0].gain < max(_GAIN, MUCH * evidence):
         return ()
     first = kinds[0]
@@ -163,21 +148,20 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
 
 
-def plainer_of(look: Look, rich: Seen, plain: Seen) -> Seen:
-    """The fit that explains more, with the likeliest kind beside it, by Schwarz's criterion."""
-    return min(rich, plain, key=lambda one: _criterion(look, one))
+def better_of(subject: Subject, rich: Outcome, plain: Outcome) -> Outcome:
+    """The fit that, with its likeliest kind, explains more by Schwarz's criterion."""
+    return min(rich, plain, key=lambda outcome: _criterion(subject, outcome))
 
 
-def _criterion(look: Look, seen: Seen) -> float:
-    """Bayesian criterion of a linear fit with the likeliest kind beside it, if there is one."""
-    e = thinned(seen.fit.residual, look.block)
-    unknown, cost = seen.fit.structure.parameters, float(e @ e)
-    if seen.named and seen.named[0].trace.size == e.size:
-        valid = look.problem.valid
-        trace = seen.named[0].trace
-        if valid is not None:
-            trace = trace * thinned(valid.astype(np.float64), look.block)
-        rows = [thinned(row, look.block) for row in jacobian(look.problem, seen.fit)]
+def _criterion(subject: Subject, outcome: Outcome) -> float:
+    """Bayesian criterion of a linear fit, with its likeliest kind if there is any."""
+    e = thinned(outcome.fit.residual, subject.block)
+    unknown, cost = outcome.fit.structure.parameters, float(e @ e)
+    if outcome.named and outcome.named[0].trace.size == e.size:
+        trace = outcome.named[0].trace
+        if subject.problem.valid is not None:
+            trace = trace * thinned(subject.problem.valid.astype(np.float64), subject.block)
+        rows = [thinned(row, subject.block) for row in jacobian(subject.problem, outcome.fit)]
         basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
         cost -= float(np.sum((basis.T @ e) ** 2))
         unknown += 1
@@ -185,27 +169,27 @@ def _criterion(look: Look, seen: Seen) -> float:
 
 
 def _curved(fit: Fit, problem: Problem) -> bool:
-    """Whether a white residual follows square, cube or direction of the linear model's output."""
+    """Whether a white residual follows the square, cube or direction of its model's output."""
     x = fit.prediction - fit.linear[-1]
     return bool(are_curved(x[None], fit.residual[None], problem.valid)[0])
 
 
 def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Mask:
-    """Which white residuals, (k, n), follow square, cube or direction of what their models say.
+    """Which white residuals, (k, n), follow the square, cube or direction of their models' output.
 
     `models` holds the outputs of the linear models, without bias; all samples count, or `counted`.
     """
     size = np.std(models, axis=1)
-    told = size > 0
-    size = np.where(told, size, 1.0)[:, None]
+    moving = size > 0
+    size = np.where(moving, size, 1.0)[:, None]
     gram = np.zeros((len(models), 7, 7))
     for first in range(0, models.shape[1], _BLOCK):
         here = slice(first, first + _BLOCK)
         x, e, before = models[:, here], residuals[:, here], min(first, 1)
         near = models[:, first - before : first + _BLOCK + 1]
         step = np.gradient(near, axis=1)[:, before : before + x.shape[1]]
-        cube, turned = x * x * x / size, np.sign(step) * size
-        rows = np.stack([np.ones_like(x), x, step, x**2, cube, turned, e], axis=1)
+        cube, direction = x * x * x / size, np.sign(step) * size
+        rows = np.stack([np.ones_like(x), x, step, x**2, cube, direction, e], axis=1)
         rows = rows if counted is None else rows[:, :, counted[here]]
         gram += rows @ rows.transpose(0, 2, 1)
     count, power = gram[:, 0, 0], gram[:, 6, 6]
@@ -213,17 +197,9 @@ def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Ma
     scale = np.where(scale > 0, scale, 1.0)
     moment = gram[:, :6, 6] / scale
     gram = gram[:, :6, :6] / (scale[:, :, None] * scale[:, None, :])
-    # What each gains beside a constant, the output, and its rate.
+    # What each explains in addition to a constant, the output, and its rate.
     mixed = np.linalg.solve(gram[:, :3, :3] + 1e-9 * np.eye(3), gram[:, :3, 3:])
-    left = 1.0 - np.einsum("kij,kij->kj", mixed, gram[:, :3, 3:])
-    taken = (moment[:, 3:] - np.einsum("kij,ki->kj", mixed, moment[:, :3])) ** 2
+    rest = 1.0 - np.einsum("kij,kij->kj", mixed, gram[:, :3, 3:])
+    explained = (moment[:, 3:] - np.einsum("kij,ki->kj", mixed, moment[:, :3])) ** 2
     needed = 2 * np.log(1 / FALSE_ALARM) * (power / count)[:, None]
-    return np.asarray(told & np.any((left > 1e-6) & (taken > needed * left), axis=1))
-
-
-def _lines(u: Real, problem: Problem) -> tuple[LineLevel, ...]:
-    """Distortion at lines left out, if the input repeats; the first period may be transient."""
-    period = find_period(u) if problem.valid is None else None
-    if period is None or u.size < 3 * period:
-        return ()
-    return detection_lines(u[period:], problem.y[period:], period=period)
+    return np.asarray(moving & np.any((rest > 1e-6) & (explained > needed * rest), axis=1))

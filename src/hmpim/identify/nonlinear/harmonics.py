@@ -1,12 +1,11 @@
-"""Harmonics that follow a sweep: what no linear system can make.
+"""Harmonics that follow a sweep, which no linear system can make.
 
-A nonlinear system answers a sinusoid of phase φ(t) at 2φ, 3φ, …: a curve in time and
-frequency of its own for each order (A. Farina, AES 108th Convention, 2000). The residual of a
-linear fit is regressed on cos kφ and sin kφ, each with an amplitude that changes slowly with
-time, after it and they were made white by an autoregression; an F test per order says whether
-there is anything. Even orders come from asymmetry, odd ones from what is alike either way:
-friction, backlash, a hard or soft spring, limits. The terms of order 1 take up whatever
-linear misfit the residual holds, so a wrong linear structure makes no harmonic.
+A nonlinear system responds to a sinusoid of phase φ(t) at 2φ, 3φ, …: each order has a curve of its
+own in time and frequency (A. Farina, AES 108th Convention, 2000). The residual of a linear fit is
+regressed on cos kφ and sin kφ with slowly changing amplitudes, after an autoregression has whitened
+both. An F test decides whether an order exists. Even orders come from asymmetry, odd ones from
+symmetric causes: friction, backlash, a hard or soft spring, limits. The terms of order 1 absorb any
+linear misfit in the residual, so a wrong linear structure makes no harmonic.
 """
 
 from collections.abc import Sequence
@@ -31,57 +30,31 @@ __all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Harmonic:
-    """One order.
+    """One order; amplitudes are in the residual's unit."""
 
-    Parameters
-    ----------
-    order : int
-        Multiple of the sweep's frequency.
-    rms : float
-        Its r.m.s. over the sweep in the residual's unit, what noise puts there taken off.
-    probability : float
-        Chance of so much, or more, from noise alone.
-    frequency, amplitude, std : tuple of float
-        Amplitude of the harmonic and its standard deviation, in the residual's unit, where the
-        sweep itself is at `frequency` in Hz; places that the order does not reach are left out.
-    """
-
-    order: int
-    rms: float
-    probability: float
-    frequency: tuple[float, ...] = ()
-    amplitude: tuple[float, ...] = ()
-    std: tuple[float, ...] = ()
+    order: int  # multiple of the sweep's frequency
+    rms: float  # over the sweep, without the noise
+    probability: float  # chance that noise alone produces as much or more
+    frequency: tuple[float, ...]  # Hz, of the sweep itself, at places that the order reaches
+    amplitude: tuple[float, ...]  # of the harmonic at these places
+    std: tuple[float, ...]  # standard deviation of the amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Harmonics:
-    """What the residual of a linear fit is made of, over the sweep.
+    """The parts of a linear fit's residual over the sweep."""
 
-    Parameters
-    ----------
-    orders : tuple of Harmonic
-        Orders 2 to 5, those that lie below the Nyquist frequency for part of the sweep.
-    fundamental_rms : float
-        R.m.s. of what still follows the sweep at its own frequency: linear misfit, and the part
-        of a nonlinearity that looks linear.
-    noise_rms : float
-        R.m.s. of the rest.
-    regression : HarmonicFit
-        What they were read off.
-    """
-
-    orders: tuple[Harmonic, ...]
-    fundamental_rms: float
-    noise_rms: float
-    regression: HarmonicFit
+    orders: tuple[Harmonic, ...]  # 2 to 5, if below the Nyquist frequency for part of the sweep
+    fundamental_rms: float  # of order 1: linear misfit, and a nonlinearity that looks linear
+    noise_rms: float  # of the rest
+    regression: HarmonicFit  # the regression that gave them
 
     def rms(self, parity: int) -> float:
         """R.m.s. of all even (0) or odd (1) orders together."""
         return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.order % 2 == parity)))
 
     def probability(self, parity: int) -> float:
-        """Chance of so much in the even (0) or odd (1) orders, the number looked at counted."""
+        """Chance that noise makes the even (0) or odd (1) orders, corrected for their number."""
         chances = [h.probability for h in self.orders if h.order % 2 == parity]
         return min(1.0, len(chances) * min(chances, default=1.0))
 
@@ -94,25 +67,11 @@ def sweep_harmonics(
     delay: float = 0.0,
     others: Sequence[SweepPhase] = (),
 ) -> Harmonics | None:
-    """Measure the harmonics of a sweep in the residual of a linear fit.
+    """Measure the harmonics of a sweep in the residual of a linear fit; None if it is too short.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        Output less prediction; 0 where a sample does not count.
-    sweep : SweepPhase
-        Of the input.
-    fs : float
-        Rate in Hz.
-    delay : float
-        Delay of the system, s; the harmonics come as much later.
-    others : sequence of SweepPhase
-        Sweeps of other inputs: what follows those is no harmonic of this one.
-
-    Returns
-    -------
-    Harmonics or None
-        None if the sweep has too few turns.
+    The residual, (n,), is output less prediction, 0 where a sample does not count; `fs` is in Hz.
+    The harmonics arrive later than the sweep by the system's delay, in s. What follows the sweeps
+    of other inputs is no harmonic of this one.
 
     Examples
     --------
@@ -131,11 +90,10 @@ def sweep_harmonics(
 
 
 def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float) -> Real:
-    """Chances that noise alone makes the harmonics seen in white residuals: a quick look.
+    """Chances that noise alone makes the harmonics of white residuals, (k, n): a quick test.
 
-    A tenth of the work of `sweep_harmonics`, and only as good as the residuals, (k, n), are white:
-    it tells where nothing need be looked for. The delay in s is rounded to a sample: this turns the
-    harmonics of a stretch alike, and only their size counts.
+    It takes a tenth of the work of `sweep_harmonics`, and holds only for white residuals. The delay
+    in s is rounded to a sample, which turns the harmonics of a stretch but keeps their size.
 
     Examples
     --------
@@ -158,13 +116,13 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
     power = np.vecdot(e, e) / number
     orders = len(view.orders)
     columns = columns_of(view)[2 : 2 + 2 * orders].reshape(orders, 2, -1)
-    seen = np.hypot(columns[:, 0], columns[:, 1])
+    present = np.hypot(columns[:, 0], columns[:, 1])
     statistic, places = np.zeros((2, residuals.shape[0], orders))
     edges = [*np.searchsorted(view.along, np.arange(view.places)).tolist(), view.index.size]
     for here in (slice(*pair) for pair in pairwise(edges)):
-        taken = np.tensordot(e[:, here], columns[..., here], axes=(1, 2))
-        count = counts[:, here] @ seen[:, here].T
-        statistic += 2.0 * np.sum(taken**2, axis=-1) / np.maximum(count, 1.0)
+        products = np.tensordot(e[:, here], columns[..., here], axes=(1, 2))
+        count = counts[:, here] @ present[:, here].T
+        statistic += 2.0 * np.sum(products**2, axis=-1) / np.maximum(count, 1.0)
         places += count > 0.5
     moves = power > 0.0
     statistic = statistic[moves] / power[moves, None]
@@ -174,7 +132,7 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
 
 
 def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
-    """Test each order, and read off its amplitude along the sweep."""
+    """Test each order, and compute its amplitude along the sweep."""
     view, count = fit.view, fit.columns.shape[0]
     frequency = np.interp(np.arange(view.places + 1), view.along, view.rate) * fs
     found = []
@@ -183,21 +141,19 @@ def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
         block, weights = fit.covariance[np.ix_(group, group)], fit.weights[group]
         statistic = float(weights @ np.linalg.pinv(block, hermitian=True) @ weights)
         part = fit.part(i)
-        # Noise alone puts as much there as the weights' variance makes of the columns.
         power = max(float(part @ part) - fit.noise_power(i), 0.0) / part.size
         at = np.arange(view.places + 1) * count + 2 * i
-        told = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
+        reached = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
         spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
+        chance = scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
         found.append(
             Harmonic(
                 order=k,
                 rms=float(np.sqrt(power)),
-                probability=float(
-                    scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
-                ),
-                frequency=tuple(frequency[told].tolist()),
-                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[told].tolist()),
-                std=tuple(np.sqrt(spread[told]).tolist()),
+                probability=float(chance),
+                frequency=tuple(frequency[reached].tolist()),
+                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
+                std=tuple(np.sqrt(spread[reached]).tolist()),
             )
         )
     degrees = max(fit.rest.size - int(np.count_nonzero(fit.used)), 1)

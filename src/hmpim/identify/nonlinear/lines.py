@@ -1,18 +1,18 @@
-"""Distortion at the lines that a periodic multisine leaves out.
+"""Distortion at the lines that a periodic multisine does not excite.
 
-A linear system answers a sum of sines at its own lines only. What stands at the lines between
-them is noise, the same from period to period on average, or distortion, which repeats: at even
-lines from asymmetric nonlinearities, at odd ones from symmetric ones (J. Schoukens,
-R. Pintelon, Y. Rolain and T. Dobrowiecki, Automatica 41, 2005).
+A linear system responds to a sum of sines at the excited lines only. Output at the lines between
+them is noise, which differs from period to period, or distortion, which repeats: at even lines from
+asymmetric nonlinearities, at odd ones from symmetric ones (J. Schoukens, R. Pintelon, Y. Rolain and
+T. Dobrowiecki, Automatica 41, 2005).
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Real
 from hmpim.identify.worth import MATERIAL, PART
 
 __all__ = ["LineLevel", "detection_lines", "find_period"]
@@ -20,36 +20,22 @@ __all__ = ["LineLevel", "detection_lines", "find_period"]
 Parity = Literal["even", "odd"]
 
 _FEWEST = 4
-"""Lines that a level is averaged over."""
+"""Fewest lines that a level is averaged over."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LineLevel:
-    """Distortion at lines of one parity.
-
-    Parameters
-    ----------
-    parity : {'even', 'odd'}
-        Even lines show asymmetric nonlinearities, odd ones symmetric.
-    lines : int
-        How many were looked at.
-    rms : float
-        R.m.s. amplitude of one line, noise taken off, in the output's unit.
-    share : float
-        That over the r.m.s. amplitude of the output's excited lines.
-    probability : float
-        Chance of so much, or more, from noise alone.
-    """
+    """Distortion at even lines (asymmetric nonlinearities) or at odd lines (symmetric ones)."""
 
     parity: Parity
-    lines: int
-    rms: float
-    share: float
-    probability: float
+    lines: int  # their number
+    rms: float  # r.m.s. amplitude of a line without noise, in the output's unit
+    share: float  # the same, over the r.m.s. amplitude of the output's excited lines
+    probability: float  # chance that noise alone produces as much or more
 
 
 def find_period(u: Real) -> int | None:
-    """Samples after which an input, (n,), repeats exactly, at least twice in the record.
+    """Samples after which an input, (n,), repeats exactly; None unless the record has two periods.
 
     Examples
     --------
@@ -78,14 +64,10 @@ def find_period(u: Real) -> int | None:
 
 
 def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
-    """Measure even and odd distortion at the lines that the input leaves out in the excited band.
+    """Measure even and odd distortion at the unexcited lines of the excited band.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Input and output in the steady state, two periods or more; the last whole ones count.
-    period : int
-        Samples per period.
+    Input and output, (n,), are in the steady state over two periods or more; the last whole ones
+    count. The period is in samples.
 
     Examples
     --------
@@ -108,30 +90,19 @@ def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
     within = (line >= max(excited[0], 1)) & (line <= min(excited[-1], mean_u.size - 2))
     silent = within & (mean_u < MATERIAL**2 * mean_u.max())
     signal = float(np.sqrt(np.mean(np.abs(mean_y[excited]) ** 2)))
-    parities: dict[Parity, Mask] = {
-        "even": silent & (line % 2 == 0),
-        "odd": silent & (line % 2 == 1),
-    }
-    return tuple(
-        _level(parity, mean_y[chosen], scatter[chosen], periods, signal)
-        for parity, chosen in parities.items()
-        if np.count_nonzero(chosen) >= _FEWEST
-    )
-
-
-def _level(parity: Parity, line: Complex, scatter: Real, periods: int, signal: float) -> LineLevel:
-    """Compare what repeats with what does not."""
-    count = line.size
-    noise = float(np.mean(scatter))
-    power = float(np.mean(np.abs(line) ** 2))
-    chance = 1.0 if power == 0 else 0.0
-    if noise > 0:
-        chance = float(scipy.stats.f.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
-    rms = float(np.sqrt(max(power - noise, 0.0)))
-    return LineLevel(
-        parity=parity,
-        lines=count,
-        rms=rms,
-        share=rms / signal if signal > 0 else 0.0,
-        probability=chance,
-    )
+    levels = []
+    for remainder, parity in enumerate(get_args(Parity)):
+        chosen = silent & (line % 2 == remainder)
+        count = int(np.count_nonzero(chosen))
+        if count < _FEWEST:
+            continue
+        noise = float(np.mean(scatter[chosen]))  # the part that does not repeat
+        power = float(np.mean(np.abs(mean_y[chosen]) ** 2))
+        chance = 1.0 if power == 0 else 0.0
+        if noise > 0:
+            chance = float(scipy.stats.f.sf(power / noise, 2 * count, 2 * count * (periods - 1)))
+        rms = float(np.sqrt(max(power - noise, 0.0)))
+        share = rms / signal if signal > 0 else 0.0
+        level = LineLevel(parity=parity, lines=count, rms=rms, share=share, probability=chance)
+        levels.append(level)
+    return tuple(levels)

@@ -1,26 +1,26 @@
 """Which nonlinearity the residual of a linear fit looks like.
 
-Each kind leaves its own trace in the residual. With x the output of the linear model, v its
+Each kind leaves its own trace in the residual. Let x be the output of the linear model, v its
 velocity and 1/A its dynamics:
 
 =================  ========================================================================
 hardening          -(1/A) x³: a spring force beyond proportion (softening: the other sign)
 friction           -(1/A) sign v: a force of constant size against the motion
 backlash           the play operator less x: the output waits at each reversal
-rate_limit         the output, or the command, followed at no more than a fixed speed, less it
+rate_limit         the output, or the command, followed at a limited speed, less itself
 saturation         x clipped, less x: a plateau
-asymmetry          -(1/A) x², or x² itself: more one way than the other
+asymmetry          -(1/A) x², or x² itself: more deflection one way than the other
 curvature          x³ itself: a scale that changes with the deflection, behind the dynamics
 =================  ========================================================================
 
-The residual is regressed on each in turn, beside all that a linear change of the model could
-explain, with noise that is an autoregression. The likelihoods say which fits best, and
-whether the next best is far enough behind to be ruled out.
+The residual is regressed on each in turn, together with everything that a linear change of the
+model could explain, in autoregressive noise. The likelihoods show which kind fits best, and whether
+the next best can be ruled out.
 
-Of a sweep the harmonics alone are held against each kind's: each makes harmonics of its own
-amplitude, phase, and course. What follows the sweep at its own frequency does not count: dynamics
-left out look like nothing here, and what of a nonlinearity the linear fit took up does not lessen
-its size.
+For a sweep, only the harmonics are compared: each kind makes harmonics of its own amplitude, phase
+and course. The residual at the sweep's own frequency does not count. So missing dynamics are not
+mistaken for a nonlinearity, and the part of a nonlinearity that the linear fit absorbed does not
+reduce its estimated size.
 """
 
 from collections.abc import Iterator
@@ -80,84 +80,62 @@ KIND_WORDS: dict[Kind, str] = {
 }
 
 GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
-"""Half gaps tried, over the output's largest deviation."""
+"""Half gaps to try, over the output's largest deviation."""
 
 RATES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)
-"""Speeds tried, over the largest of the linear model."""
+"""Speeds to try, over the largest of the linear model."""
 
 _LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0.95)
-"""Plateaus tried, over the largest deviation."""
+"""Plateaus to try, over the largest deviation."""
 
 _STICKS = 0.01
-"""Speed, over the largest, at which friction is fully turned around: below the sampling's reach."""
+"""Speed, over the largest, at which friction has fully reversed: faster than samples resolve."""
 
 LONGEST_AUTOREGRESSION = 10
-"""Order of the noise that a trace is held against, at most."""
+"""Largest order of the noise model when a trace is tested."""
 
 _LONGEST = 32768
-"""Samples looked at; of a longer record the stretch with the greatest residual."""
+"""Samples analysed; of a longer record, the stretch with the largest residual."""
 
 _LAGS = 8
-"""Samples of the input on either side that a linear change of the model may use."""
+"""Samples by which a linear change of the model may shift its output, either way."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Mechanism:
-    """One kind of nonlinearity, as well as it fits the residual.
+    """The best fit of one kind of nonlinearity to the residual.
 
-    Parameters
-    ----------
-    kind : str
-        Name as in the module's table.
-    size : float
-        Hardening and softening: share by which the force at the largest deviation departs from
-        proportion. Friction and backlash: half width of the band, in the output's unit.
-        Rate limit: speed in the unit per second. Saturation: distance of the plateau from
-        the bias, in the unit. Asymmetry, curvature: share by which the output at the largest
-        deviation departs from proportion.
-    size_std : float
-        Standard deviation; the spacing of the values tried where it is one of a list.
-    gain : float
-        Log-likelihood above that of no nonlinearity in noise of the same colour.
-    likelihood : float
-        Log-likelihood, the same constant left out for all kinds.
-    rms : float
-        R.m.s. of what of its effect in the output no linear change explains, in its unit.
-    effect : float
-        R.m.s. of its whole effect, in the output's unit.
-    trace : ndarray, shape (n,)
-        Its effect in the output, to a factor; empty where only part of the record was looked at.
+    The size of hardening, softening, asymmetry and curvature is the relative deviation of force or
+    output from proportionality at the largest deflection. That of friction and backlash is the half
+    width of the band, that of saturation the distance of the plateau from the bias, both in the
+    output's unit. That of a rate limit is the speed, in the same unit per second.
     """
 
     kind: Kind
     size: float
-    size_std: float
-    gain: float
-    likelihood: float
-    rms: float
-    effect: float
-    trace: Real
+    size_std: float  # standard deviation; for a size from a list, half the spacing of the list
+    gain: float  # log-likelihood gained over no nonlinearity, in noise of the same colour
+    likelihood: float  # log-likelihood, up to a constant that is the same for all kinds
+    rms: float  # of the part that no linear change explains, in the output's unit
+    effect: float  # r.m.s. of the whole effect, in the output's unit
+    trace: Real  # (n,): effect in the output, up to a factor, over the samples analysed
 
 
-def play(x: Real, half_gap: float) -> Real:
-    """Output of backlash: follows `x`, (n,), half a gap behind, and waits at each reversal.
+def _reversals(x: Real) -> NDArray[np.intp]:
+    """Reversals of a signal, and its end: only there must the output of backlash be computed."""
+    way = np.sign(np.diff(x))
+    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
+
+
+def play(x: Real, half_gap: float, reversals: NDArray[np.intp] | None = None) -> Real:
+    """Output of backlash: it follows `x`, (n,), half a gap behind, and waits at each reversal.
 
     Examples
     --------
     >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
     [0.0, 0.5, 1.5, 1.5, 0.5]
     """
-    return _waiting(x, half_gap, _reversals(x))
-
-
-def _reversals(x: Real) -> NDArray[np.intp]:
-    """Where a signal turns, and its end: only there the output of backlash must be known."""
-    way = np.sign(np.diff(x))
-    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
-
-
-def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
-    """`play`: from one reversal to the next the output moves one way."""
+    turns = _reversals(x) if reversals is None else reversals
     before, now = [], float(x[0])
     for turn in x[turns].tolist():
         before.append(now)
@@ -167,7 +145,7 @@ def _waiting(x: Real, half_gap: float, turns: NDArray[np.intp]) -> Real:
 
 
 def rate_limited(x: Real, step: float) -> Real:
-    """Follow `x` by no more than `step` from sample to sample.
+    """Follow `x`, moving by no more than `step` from sample to sample.
 
     Examples
     --------
@@ -179,7 +157,7 @@ def rate_limited(x: Real, step: float) -> Real:
     fast = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
     for lost in fast:
         if lost < reached:
-            continue  # behind already
+            continue  # already behind
         now = target[lost]
         for reached in range(lost + 1, len(target)):  # until it has caught up
             ahead = target[reached] - now
@@ -199,52 +177,29 @@ def rate_limited(x: Real, step: float) -> Real:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hypothesis:
-    """A kind with one value tried, and its trace.
-
-    Parameters
-    ----------
-    kind : str
-        Name as in the module's table.
-    trace : ndarray, shape (n,)
-        Effect in the output.
-    size : float or None
-        None where the weight of the trace is the size.
-    spacing : float
-        Half the spacing of the values tried.
-    """
+    """A kind with one value to try, and its trace."""
 
     kind: Kind
-    trace: Real
-    size: float | None = None
-    spacing: float = 0.0
+    trace: Real  # (n,): effect in the output
+    size: float | None = None  # None if the weight of the trace is the size
+    spacing: float = 0.0  # half the spacing of the values to try
 
-    def weighed(
-        self,
-        weight: float,
-        error: float,
-        *,
-        gain: float,
-        likelihood: float,
-        rms: float,
-        effect: float,
-    ) -> Mechanism:
-        """The kind as well as it fits, its trace taken so many times, with the error of that."""
+    def weighed(self, weight: float, error: float, **figures: float) -> Mechanism:
+        """The kind with a weight and its error; `figures` are gain, likelihood, rms and effect."""
+        size, size_std = (weight, error) if self.size is None else (self.size, 0.0)
         return Mechanism(
             kind=self.kind,
-            size=weight if self.size is None else self.size,
-            size_std=float(np.hypot(error if self.size is None else 0.0, self.spacing)),
-            gain=gain,
-            likelihood=likelihood,
-            rms=rms,
-            effect=effect,
+            size=size,
+            size_std=float(np.hypot(size_std, self.spacing)),
             trace=self.trace,
+            **figures,
         )
 
 
 def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechanism, ...]:
     """Fit each kind of nonlinearity to the residual of a linear fit, the likeliest first.
 
-    One of each kind whose weight has the right sign is returned; `fs` is the rate in Hz.
+    Each kind whose weight has the right sign is returned once; `fs` is the rate in Hz.
 
     Examples
     --------
@@ -276,59 +231,41 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
 def compare_harmonics(
     fit: HarmonicFit, x: Real, denominator: Real, *, fs: float
 ) -> tuple[Mechanism, ...]:
-    """Hold the harmonics of each kind against those of a residual, the likeliest first.
+    """Compare the harmonics of each kind with those of a residual, the likeliest first.
 
-    Parameters
-    ----------
-    fit : HarmonicFit
-        Regression of the residual; each kind's trace is regressed as it was, and orders 2 and up
-        are compared.
-    x, denominator, fs
-        As for `hypotheses`.
-
-    Returns
-    -------
-    tuple of Mechanism
-        One of each kind whose weight has the right sign. `Mechanism.rms` is that of its harmonics.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.harmonics import sweep_harmonics
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> seen = sweep_harmonics(y - u, sweep_phase(u, 100.0), 100.0)
-    >>> best = compare_harmonics(seen.regression, u, np.ones(1), fs=100.0)[0]
-    >>> best.kind, round(best.size, 2)
-    ('backlash', 0.1)
+    Each trace is regressed as the residual was in `fit`, and orders 2 and up are compared. Each
+    kind whose weight has the right sign is returned once; its `rms` is that of its harmonics. The
+    other arguments are as for `hypotheses`.
     """
     tried = list(hypotheses(x, denominator, fs))
     group = fit.group(2, 2 * len(fit.orders))
     values, vectors = np.linalg.eigh(fit.covariance[np.ix_(group, group)])
     kept = values > 1e-12 * values[-1]
     whiten = vectors[:, kept] / np.sqrt(values[kept])  # to unit variance each
-    seen, gram = fit.weights[group] @ whiten, fit.gram(group)
+    observed, gram = fit.weights[group] @ whiten, fit.gram(group)
     best: dict[Kind, Mechanism] = {}
-    for one, weights in zip(tried, fit.weights_of(np.stack([h.trace for h in tried])), strict=True):
-        own = weights[group]
-        made = own @ whiten
-        power, along = float(made @ made), float(made @ seen)
+    traces = np.stack([hypothesis.trace for hypothesis in tried])
+    for hypothesis, all_weights in zip(tried, fit.weights_of(traces), strict=True):
+        weights = all_weights[group]
+        expected = weights @ whiten
+        power, along = float(expected @ expected), float(expected @ observed)
         gain = 0.5 * along**2 / power if power > 0.0 and along > 0.0 else 0.0
-        if gain > (best[one.kind].gain if one.kind in best else 0.0):
+        known = best.get(hypothesis.kind)
+        if gain > (known.gain if known else 0.0):
             weight = along / power
-            best[one.kind] = one.weighed(
+            best[hypothesis.kind] = hypothesis.weighed(
                 weight,
-                float(np.linalg.norm(made)) ** -1,
+                float(np.linalg.norm(expected)) ** -1,
                 gain=gain,
                 likelihood=gain,
-                rms=weight * float(own @ gram @ own) ** 0.5,
-                effect=weight * float(np.std(one.trace[fit.view.index])),
+                rms=weight * float(weights @ gram @ weights) ** 0.5,
+                effect=weight * float(np.std(hypothesis.trace[fit.view.index])),
             )
     return tuple(sorted(best.values(), key=lambda m: -m.likelihood))
 
 
 def stretch_of(residual: Real) -> slice:
-    """The stretch that is looked at: all, or the part of a long record with most to explain."""
+    """The stretch to analyse: all, or the part of a long record with the largest residual."""
     n = residual.size
     if n <= _LONGEST:
         return slice(0, n)
@@ -339,10 +276,12 @@ def stretch_of(residual: Real) -> slice:
 
 
 def _background(problem: Problem, fit: Fit, here: slice) -> Real:
-    """All that a linear change of the model could explain, orthonormal, shape (k, m)."""
+    """Orthonormal basis of all that a linear change of the model could explain, shape (k, m)."""
     x = fit.prediction - fit.linear[-1]
-    shifted = [problem.masked(_shifted(x, k))[here] for k in range(-_LAGS, _LAGS + 1, 2)]
-    stacked = np.vstack([jacobian(problem, fit)[:, here], np.stack(shifted)])
+    index = np.arange(x.size)
+    lags = range(-_LAGS, _LAGS + 1, 2)
+    shifted = [problem.masked(x[np.clip(index - k, 0, x.size - 1)])[here] for k in lags]
+    stacked = np.vstack([jacobian(problem, fit)[:, here], *shifted])
     norms = np.linalg.norm(stacked, axis=1)
     stacked = stacked[norms > 0] / norms[norms > 0, None]
     values, vectors = np.linalg.eigh(stacked @ stacked.T)
@@ -350,31 +289,19 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
-def _shifted(x: Real, by: int) -> Real:
-    index = np.clip(np.arange(x.size) - by, 0, x.size - 1)
-    return x[index]
-
-
 def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
-    """Every kind with every value tried.
+    """Every kind with every value to try.
 
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        The linear model's output less its bias.
-    denominator : ndarray
-        Of the dynamics that a force goes through, by rising powers of s per sample.
-    fs : float
-        Rate in Hz.
-    every : int
-        One of so many values is tried, in the middle of each run of them.
+    `x`, (n,), is the linear model's output less its bias; the denominator, by rising powers of s
+    per sample, is of the dynamics that a force acts on; `fs` is the rate in Hz. With `every` = 3,
+    the middle value of each three is tried.
     """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
 
     def through(forces: Real) -> Real:
-        """Answers of the dynamics, without delay, to forces given in the output's unit."""
+        """Responses of the dynamics, without delay, to forces given in the output's unit."""
         first = forces[:, :1]
         source = prepare_input(forces - first, "foh")
         answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
@@ -387,45 +314,40 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="curvature", trace=-cube)
     yield Hypothesis(kind="asymmetry", trace=square)
     yield Hypothesis(kind="asymmetry", trace=-square)
-    if denominator[0] > 0 and denominator.size > 1:  # an integrator gives way to any force
-        dry = np.tanh(step / (_STICKS * fastest))
-        stiff, uneven, rubbed = through(np.stack((cube, square, dry)))
-        yield Hypothesis(kind="hardening", trace=-stiff)
-        yield Hypothesis(kind="softening", trace=stiff)
-        yield Hypothesis(kind="asymmetry", trace=-uneven)
-        yield Hypothesis(kind="asymmetry", trace=uneven)
-        yield Hypothesis(kind="friction", trace=-rubbed)
-    turns = _reversals(x)
+    if denominator[0] > 0 and denominator.size > 1:  # an integrator has no restoring force
+        direction = np.tanh(step / (_STICKS * fastest))
+        cubic, quadratic, friction = through(np.stack((cube, square, direction)))
+        yield Hypothesis(kind="hardening", trace=-cubic)
+        yield Hypothesis(kind="softening", trace=cubic)
+        yield Hypothesis(kind="asymmetry", trace=-quadratic)
+        yield Hypothesis(kind="asymmetry", trace=quadratic)
+        yield Hypothesis(kind="friction", trace=-friction)
+    reversals = _reversals(x)
     for gap in GAPS[every // 2 :: every]:
         half = gap * largest
-        trace = (_waiting(x, half, turns) - x) / half
+        trace = (play(x, half, reversals) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS[every // 2 :: every]:
-        size = level * largest
-        yield Hypothesis(
-            kind="saturation", trace=np.clip(x, -size, size) - x, size=size, spacing=0.05 * largest
-        )
+        size, spacing = level * largest, 0.05 * largest
+        trace = np.clip(x, -size, size) - x
+        yield Hypothesis(kind="saturation", trace=trace, size=size, spacing=spacing)
     for rate in RATES[every // 2 :: every]:
-        size = rate * fastest
-        yield Hypothesis(
-            kind="rate_limit",
-            trace=rate_limited(x, size) - x,
-            size=size * fs,
-            spacing=0.05 * fastest * fs,
-        )
+        size, spacing = rate * fastest, 0.05 * fastest * fs
+        trace = rate_limited(x, size) - x
+        yield Hypothesis(kind="rate_limit", trace=trace, size=size * fs, spacing=spacing)
 
 
 def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) -> Mechanism | None:
-    """Weight by generalised least squares, the noise's colour from what is then left."""
+    """Fit a hypothesis by generalised least squares, with the noise colour of a first residual."""
     h = hypothesis.trace * counted
     alone = h - (background @ h) @ background
     power = float(alone @ alone)
-    if power <= 1e-10 * float(h @ h) or power == 0.0:
+    if power <= 1e-10 * float(h @ h):
         return None
     weight = max(float(alone @ e) / power, 0.0)
-    left = e - (background @ e) @ background - weight * alone
-    colour, _ = yule_walker(left[counted], LONGEST_AUTOREGRESSION)
-    # Samples that do not count are passed over: what is left keeps its linear relation.
+    residual = e - (background @ e) @ background - weight * alone
+    colour, _ = yule_walker(residual[counted], LONGEST_AUTOREGRESSION)
+    # Samples that do not count are skipped: the others keep their linear relation.
     rows = scipy.signal.lfilter(colour, [1.0], np.vstack([background, h])[:, counted], axis=1)
     white = scipy.signal.lfilter(colour, [1.0], e[counted])
     q, r = np.linalg.qr(rows.T)  # the trace last

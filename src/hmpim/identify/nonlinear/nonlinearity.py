@@ -1,9 +1,9 @@
 """Whether the system is linear, and if not, in which way and by how much.
 
-A sweep answers the first question by its harmonics, a multisine by the lines it leaves out,
-any other input by how much better a nonlinear trace explains the residual. Which way is for
-`hmpim.identify.nonlinear.mechanisms`, asked only where there is something to explain. Dependence on
-the amplitude takes several records: `hmpim.identify.records.levels`.
+A sweep shows a nonlinearity by its harmonics, a multisine by output at its unexcited lines, any
+other input by how much better a nonlinear trace explains the residual. If there is one,
+`hmpim.identify.nonlinear.mechanisms` determines its kind. Dependence on the amplitude takes several
+records: `hmpim.identify.records.levels`.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Look, Seen, look_at, plainer_of, thinned
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit, thinned
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
 from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
@@ -27,31 +27,18 @@ from hmpim.record import Finding
 __all__ = ["Inspection", "inspect_nonlinearity"]
 
 _LONGEST = 32768
-"""Samples of a sweep looked at one by one; longer records are averaged in blocks first."""
+"""Samples up to which a sweep is analysed as it is; longer ones are first averaged in blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Inspection:
-    """What was found.
+    """Result of the search for a nonlinearity."""
 
-    Parameters
-    ----------
-    seen : Seen
-        Results of the tests.
-    findings : tuple of Finding
-        Code 'nonlinear' if it matters; then the code of the kind where it can be named:
-        'hardening', 'softening', 'friction', 'backlash', 'rate_limit', 'saturation'.
-    fit : Fit
-        The linear fit that goes with it: the given one, or the plainer one where that and one
-        kind of nonlinearity explain the output better.
-    summary : Nonlinearity
-        The same, as the result keeps it.
-    """
-
-    seen: Seen
-    findings: tuple[Finding, ...]
+    seen: Outcome
+    findings: tuple[Finding, ...]  # 'nonlinear' if it matters, then its kind if that is certain
+    # the given linear fit, or the plainer one if that and one kind explain the output better
     fit: Fit
-    summary: Nonlinearity
+    summary: Nonlinearity  # the same, for the result
 
 
 def inspect_nonlinearity(
@@ -65,25 +52,12 @@ def inspect_nonlinearity(
     floor: float = 0.0,
     unit: str = "",
 ) -> Inspection:
-    """Look for nonlinearity in what a linear fit leaves over.
+    """Look for nonlinearity in the residual of a linear fit.
 
-    Parameters
-    ----------
-    u : ndarray, shape (n,)
-        Input samples.
-    problem, fit
-        The data and the linear fit.
-    fs : float
-        Rate in Hz.
-    plain : Fit, optional
-        Of a plainer structure, to be weighed against `fit` if there is a nonlinearity: a rich
-        structure may have been taken for the sake of what is not linear.
-    others : sequence of ndarray, shape (n,)
-        Other inputs that drove the output at the same time: then harmonics alone are asked.
-    floor : float
-        R.m.s. up to which nothing is said, in the output's unit: the error of rounding.
-    unit : str
-        The output's unit, for the sentences.
+    The input has shape (n,), `fs` is in Hz. If there is a nonlinearity, `fit` is compared with one
+    of a plainer structure: a rich structure may only imitate it. If other inputs, (n,), drove the
+    output at the same time, only harmonics are tested. Effects up to `floor` are ignored, the
+    r.m.s. error of rounding in the output's unit.
 
     Examples
     --------
@@ -102,113 +76,101 @@ def inspect_nonlinearity(
     output = float(np.std(counted))
     block = -(-u.size // _LONGEST)
     sweep = sweep_phase(thinned(u, block), fs / block)
-    look = Look(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
-    seen = look_at(look, fit)
-    if plain is not None and seen.rms > 0:
-        seen = plainer_of(look, seen, look_at(look, plain))
-    matters = seen.effect > WORTH * output and seen.rms > floor
-    named = seen.named if matters else ()
-    shares = _shares(seen, seen.fit.cost / max(problem.counted, 1))
+    subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
+    outcome = inspect_fit(subject, fit)
+    if plain is not None and outcome.rms > 0:
+        outcome = better_of(subject, outcome, inspect_fit(subject, plain))
+    matters = outcome.effect > WORTH * output and outcome.rms > floor
+    named = outcome.named if matters else ()
+    shares = _shares(outcome, outcome.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
-        findings.append(_general(seen, output, shares, asked=not others))
+        findings.append(_general(outcome, output, shares, compared=not others))
         if len(named) == 1 and (of_kind := _particular(named[0], unit)) is not None:
             findings.append(of_kind)
     return Inspection(
-        seen=seen,
+        seen=outcome,
         findings=tuple(findings),
-        fit=seen.fit if matters else fit,
-        summary=_summary(look, seen, shares, output, unit=unit, named=named),
+        fit=outcome.fit if matters else fit,
+        summary=_summary(subject, outcome, shares, output, unit=unit, named=named),
     )
 
 
-def _shares(seen: Seen, power: float) -> tuple[float, float, float]:
-    """Noise, what follows the input at its own frequency, and what no linear system makes."""
-    if power <= 0:
-        return 0.0, 0.0, 0.0
-    if seen.harmonics is None:
-        nonlinear = min(seen.rms**2 / power, 1.0)
-        return 1.0 - nonlinear, 0.0, nonlinear
-    parts = np.square([seen.harmonics.noise_rms, seen.harmonics.fundamental_rms, seen.rms])
-    noise, linear, nonlinear = parts / parts.sum()
-    return float(noise), float(linear), float(nonlinear)
+def _shares(outcome: Outcome, power: float) -> dict[str, float]:
+    """Shares of the residual's power: noise, linear in the input, nonlinear."""
+    noise = linear = nonlinear = 0.0
+    if outcome.harmonics is not None and power > 0:
+        harmonics = outcome.harmonics
+        parts = np.square([harmonics.noise_rms, harmonics.fundamental_rms, outcome.rms])
+        noise, linear, nonlinear = (parts / parts.sum()).tolist()
+    elif power > 0:
+        nonlinear = min(outcome.rms**2 / power, 1.0)
+        noise = 1.0 - nonlinear
+    return {"noise": noise, "linear": linear, "nonlinear": nonlinear}
 
 
-def _where(seen: Seen, output: float) -> list[str]:
-    """In words: which harmonics, which lines, or which symmetry."""
+def _where(outcome: Outcome, output: float) -> list[str]:
+    """Harmonics, lines or symmetry in words."""
     where = []
-    if seen.harmonics is not None:
+    if outcome.harmonics is not None:
         where = [
-            f"{percent(seen.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
+            f"{percent(outcome.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
             for name, parity in (("odd", 1), ("even", 0))
-            if seen.harmonics.probability(parity) < FALSE_ALARM
+            if outcome.harmonics.probability(parity) < FALSE_ALARM
         ]
-    elif seen.mechanisms:
-        even = seen.mechanisms[0].kind == "asymmetry"
+    elif outcome.mechanisms:
+        even = outcome.mechanisms[0].kind == "asymmetry"
         where = [f"{'even' if even else 'odd'} in the deflection"]
     return where + [
         f"{percent(level.share)} % at {level.parity} lines left out"
-        for level in seen.lines
+        for level in outcome.lines
         if level.probability < FALSE_ALARM
     ]
 
 
 def _general(
-    seen: Seen, output: float, made_of: tuple[float, float, float], *, asked: bool
+    outcome: Outcome, output: float, shares: dict[str, float], *, compared: bool
 ) -> Finding:
-    """Say that it is nonlinear, how much, even or odd, and what it may be.
-
-    `made_of` has the shares of the residual's power: noise, linear, nonlinear; `asked` is whether
-    the kinds were compared at all.
-    """
-    noise, linear, nonlinear = (100 * part for part in made_of)
-    share, effect = seen.rms / output, seen.effect / output
-    names = [KIND_WORDS[one.kind] for one in seen.named]
+    """Report a nonlinearity, its size, parity and kind; `compared` if kinds were compared."""
+    noise, linear, nonlinear = (100 * share for share in shares.values())
+    share, effect = outcome.rms / output, outcome.effect / output
+    names = [KIND_WORDS[mechanism.kind] for mechanism in outcome.named]
     if len(names) == 1:
         guess = f"It looks like {names[0]}."
     elif names:
         guess = f"It may be {' or '.join(names)}; this record does not show which."
-    elif asked:
+    elif compared:
         guess = "None of the kinds tried fits alone."
     else:
         guess = "Drive one input at a time to see which kind it is."
     if effect > (1 + MOST) * share:
         guess += f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
-    where = _where(seen, output)
+    where = _where(outcome, output)
     at = f": {' and '.join(where)}" if where else ""
-    left = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
-    if seen.harmonics is None:  # a sweep's own frequency tells dynamics left out from noise
-        left += " or dynamics left out"
+    split = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
+    if outcome.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
+        split += " or dynamics left out"
     elif linear >= 0.5:
-        left += f"; {linear:.0f} % still follows the input"
+        split += f"; {linear:.0f} % still follows the input"
     return Finding(
         code="nonlinear",
-        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {left}. "
+        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {split}. "
         "Identify at several amplitudes to see where the linear model holds.",
-        severity="doubt" if seen.effect > MATERIAL * output else "info",
+        severity="doubt" if outcome.effect > MATERIAL * output else "info",
         parameters=MODELLED,
     )
 
 
 def _particular(found: Mechanism, unit: str) -> Finding | None:
-    """Say what the kind means, with its number, and what to do about it; None where unnamed.
-
-    Examples
-    --------
-    >>> found = Mechanism(
-    ...     kind="backlash", size=0.1, size_std=0.01, gain=99.0, likelihood=0.0, rms=0.02,
-    ...     effect=0.05, trace=np.zeros(0))
-    >>> _particular(found, "deg").message[:48]
-    'There is play of 0.200 ± 0.020 deg in total. Loo'
-    """
+    """Explain a kind, its size, and what to do about it; None for those without an explanation."""
     of = f" {unit}" if unit else ""
     share = f"{plus_minus(100 * found.size, 100 * found.size_std)} %"
     size = f"{plus_minus(found.size, found.size_std)}{of}"
     match found.kind:
         case "hardening" | "softening":
             way, moves = ("above", "higher") if found.kind == "hardening" else ("below", "lower")
-            # Of a cubic force beside a sinusoid three quarters act like a spring; half of a
-            # spring's change goes into the frequency.
+            # Under a sinusoid, three quarters of a cubic force act like a spring; the frequency
+            # changes by half of the spring's change.
             message = (
                 f"At the largest deflection the restoring force is {share} {way} that of a linear "
                 f"spring, so the natural frequency there is about {percent(0.375 * found.size)} % "
@@ -241,63 +203,51 @@ def _particular(found: Mechanism, unit: str) -> Finding | None:
 
 
 def _summary(
-    look: Look,
-    seen: Seen,
-    shares: tuple[float, float, float],
+    subject: Subject,
+    outcome: Outcome,
+    shares: dict[str, float],
     output: float,
     *,
     unit: str,
     named: tuple[Mechanism, ...],
 ) -> Nonlinearity:
-    """What the result keeps."""
+    """Summarise for the result."""
     even = odd = 0.0
-    curves: tuple[HarmonicCurve, ...] = ()
-    if seen.harmonics is not None:
-        even, odd = (seen.harmonics.rms(p) / output for p in (0, 1))
-        curves = (
-            _own_amplitude(
-                seen.harmonics.regression.view,
-                thinned(seen.fit.prediction, look.block),
-                look.fs / look.block,
-            ),
-            *(
-                HarmonicCurve(
-                    order=h.order, frequency=h.frequency, amplitude=h.amplitude, std=h.std
-                )
-                for h in seen.harmonics.orders
-            ),
-        )
-    elif seen.mechanisms:
-        share = seen.mechanisms[0].rms / output
-        even, odd = (share, 0.0) if seen.mechanisms[0].kind == "asymmetry" else (0.0, share)
+    curves: list[HarmonicCurve] = []
+    if (harmonics := outcome.harmonics) is not None:
+        even, odd = (harmonics.rms(p) / output for p in (0, 1))
+        model = thinned(outcome.fit.prediction, subject.block)
+        curves = [_own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)]
+        for h in harmonics.orders:
+            parts = {"frequency": h.frequency, "amplitude": h.amplitude, "std": h.std}
+            curves.append(HarmonicCurve(order=h.order, **parts))
+    elif outcome.mechanisms:
+        share = outcome.mechanisms[0].rms / output
+        even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)
     size = None
     if len(named) == 1:
-        (one,) = named
-        measures = {"friction": unit, "backlash": unit, "saturation": unit}
-        measures["rate_limit"] = f"{unit}/s" if unit else "1/s"
-        half = HALF * one.size_std
+        found, half = named[0], HALF * named[0].size_std
+        units = {"friction": unit, "backlash": unit, "saturation": unit}
+        units["rate_limit"] = f"{unit}/s" if unit else "1/s"
         size = Estimate(
-            value=one.size,
-            std=one.size_std,
-            ci95=(one.size - half, one.size + half),
-            unit=measures.get(one.kind, ""),
+            value=found.size,
+            std=found.size_std,
+            ci95=(found.size - half, found.size + half),
+            unit=units.get(found.kind, ""),
         )
-    noise, linear, nonlinear = shares
     return Nonlinearity(
-        share=seen.rms / output if output else 0.0,
+        share=outcome.rms / output if output else 0.0,
         even=even,
         odd=odd,
-        noise=noise,
-        linear=linear,
-        nonlinear=nonlinear,
-        kinds=tuple(m.kind for m in named),
+        kinds=tuple(mechanism.kind for mechanism in named),
         size=size,
-        harmonics=curves,
+        harmonics=tuple(curves),
+        **shares,
     )
 
 
 def _own_amplitude(view: SweepView, x: Real, fs: float) -> HarmonicCurve:
-    """Amplitude of the linear model's output along the sweep, where the harmonics are told."""
+    """Amplitude of the linear model's output at the places of the harmonics."""
     frequency, amplitude = [], []
     for place in range(view.places + 1):
         near = view.index[np.abs(view.along - place) < 0.5]
@@ -305,8 +255,5 @@ def _own_amplitude(view: SweepView, x: Real, fs: float) -> HarmonicCurve:
             frequency.append(fs * float(np.interp(place, view.along, view.rate)))
             amplitude.append(float(np.std(x[near]) * np.sqrt(2.0)))
     return HarmonicCurve(
-        order=1,
-        frequency=tuple(frequency),
-        amplitude=tuple(amplitude),
-        std=(0.0,) * len(frequency),
+        order=1, frequency=tuple(frequency), amplitude=tuple(amplitude), std=(0.0,) * len(frequency)
     )

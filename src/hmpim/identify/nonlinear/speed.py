@@ -1,9 +1,9 @@
-"""A command that the unit follows at no more than a fixed speed.
+"""A command that the unit follows up to a limited speed.
 
-Below its servo's greatest speed a unit is linear; beyond, a ramp of that speed takes the place of
-the command until it has caught up. With the speed known all else is linear, so that it is one more
-parameter of the likelihood: it is profiled with the plain structures, on a clock finer than the
-samples, since ramps begin between them.
+Below its servo's greatest speed a unit is linear; above it, a ramp at that speed replaces the
+command until the unit has caught up. With a known speed the rest of the model is linear, so that
+the speed is one more parameter of the likelihood. It is profiled with the plain structures, on a
+clock finer than the samples, since ramps begin between them.
 """
 
 from dataclasses import dataclass, replace
@@ -27,59 +27,36 @@ from hmpim.identify.worth import PART, TWICE
 from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
 from hmpim.record import Finding, Intersample
 
-__all__ = [
-    "LimitedCommand",
-    "beside_speed",
-    "explains_more",
-    "limited_command",
-    "speed_finding",
-]
+__all__ = ["LimitedCommand", "beside_speed", "explains_more", "limited_command", "speed_finding"]
 
 _FINE = 8
-"""Steps of the finer clock to a sample."""
+"""Steps of the finer clock per sample."""
 
 _LONGEST = 32768
-"""Samples up to which it is asked: ramps are followed one step after the other."""
-
-_SMOOTH: tuple[Intersample, ...] = ("bandlimited", "foh")
-"""What the command may do between its samples; a held one jumps, at any speed."""
+"""Longest record tested, in samples: ramps are computed step by step."""
 
 _STEP = 0.01
-"""Step in the speed, over the command's fastest, between which the curvature is read."""
+"""Step in the speed for its curvature, over the greatest speed of the command."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LimitedCommand:
-    """What a unit of limited speed makes of its command.
+    """A command as a unit of limited speed follows it; speeds are in its unit per sample."""
 
-    Parameters
-    ----------
-    speed, std : float
-        Greatest speed and its standard deviation, input's unit per sample.
-    fastest : float
-        Greatest speed of the command, in the same unit.
-    values : ndarray, shape (n,)
-        What the unit follows, at the samples.
-    recorded : ndarray, shape (n,)
-        The command.
-    slope : ndarray, shape (n,)
-        Derivative of the output with the speed, all other parameters kept, to a factor.
-    """
-
-    speed: float
-    std: float
-    fastest: float
-    values: Real
-    recorded: Real
-    slope: Real
+    speed: float  # greatest speed of the unit
+    std: float  # its standard deviation
+    fastest: float  # greatest speed of the command
+    values: Real  # (n,): what the unit follows, at the samples
+    recorded: Real  # (n,): the command
+    slope: Real  # (n,): partial derivative of the output by the speed, up to a factor
 
 
 def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     """Find the speed beyond which a command, (n,), is not followed.
 
-    Nothing is asked if a plain fit leaves white noise, or a richer one less than 1/25 of what the
-    best plain one leaves. None where a limit does not explain more than the linear fit (odds of 400
-    to 1), or than another kind of nonlinearity.
+    No limit is tried if the residual of a plain fit is white, or if a richer fit has less than 1/25
+    of the best plain one's cost. None unless a limit explains more than the linear fit (odds of 400
+    to 1), and more than any other kind of nonlinearity.
 
     Examples
     --------
@@ -99,18 +76,18 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     start = min(plain, key=lambda trial: trial.criterion)
     if best.fit.cost < PART**2 * start.fit.cost:
         return None  # a limit makes harmonics, which poles cannot imitate that well
-    smooth, joined = _SMOOTH
-    command = _Followed.of(u, smooth, problem, start.fit)
-    linear = fit_structure(problem, best.fit.structure, best.fit.theta)  # as those with a limit are
+    # Between its samples the command may be smooth; a held one jumps, at any speed.
+    command = _Followed.of(u, "bandlimited", problem, start.fit)
+    linear = fit_structure(problem, best.fit.structure, best.fit.theta)  # as those with a limit
     near = _nearest(command, linear)
     if near is None:
         return None
     found = _profiled(u, command, *near)
     speed, least = near if found is None else (found[0].speed / _FINE, found[1])
-    other = _Followed.of(u, joined, problem, start.fit)
+    other = _Followed.of(u, "foh", problem, start.fit)
     if other.fit(speed, least).cost < TWICE * least.cost:
-        tried = (found, _profiled(u, other, speed, least))
-        found = min((one for one in tried if one), key=lambda one: one[1].cost, default=None)
+        both = [each for each in (found, _profiled(u, other, speed, least)) if each]
+        found = min(both, key=lambda each: each[1].cost, default=None)
     if found is None or not explains_more(problem, found[1], problem, linear):
         return None
     limited, fit = found
@@ -119,35 +96,31 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
         plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
     gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
     others = bends(u, problem, plainly, intersample=start.intersample, fs=1.0)
-    if any(one.kind != "rate_limit" and one.gain > gained for one in others):
+    if any(other.kind != "rate_limit" and other.gain > gained for other in others):
         return None
     return limited
 
 
 def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
-    """Whether a fit with a limit of speed is likelier than the best linear one by 400 to 1.
+    """Whether a fit with a limited speed is likelier than the best linear one by 400 to 1.
 
-    Each to its own data. Both in noise that is an autoregression, the limit for the price of a
-    parameter.
+    Each fit has its own data. Both are in autoregressive noise; the limit counts as a parameter.
     """
-    return _likelier(limited, fit, linear, best) > CLEARLY
+    return _log_odds(limited, fit, linear, best) > CLEARLY
 
 
-def _likelier(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> float:
-    """Logarithm of those odds."""
+def _log_odds(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> float:
     count = limited.counted
-    one, other = (
-        yule_walker(p.masked(f.residual), LONGEST_AUTOREGRESSION)[1]
-        for p, f in ((limited, fit), (linear, best))
-    )
-    if one <= 0.0 or other <= 0.0:
+    with_limit = yule_walker(limited.masked(fit.residual), LONGEST_AUTOREGRESSION)[1]
+    without = yule_walker(linear.masked(best.residual), LONGEST_AUTOREGRESSION)[1]
+    if with_limit <= 0.0 or without <= 0.0:
         return -np.inf
     extra = fit.structure.parameters + 1 - best.structure.parameters
-    return 0.5 * float(count * np.log(other / one) - extra * np.log(count))
+    return 0.5 * float(count * np.log(without / with_limit) - extra * np.log(count))
 
 
 def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
-    """Say how fast the unit follows at most."""
+    """Report the greatest speed of the unit."""
     per = f" {unit}/s" if unit else " per s"
     return Finding(
         code="rate_limit",
@@ -162,37 +135,38 @@ def speed_finding(limited: LimitedCommand, fs: float, unit: str) -> Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Followed:
-    """A command on the finer clock, and the data and the plain fit to it.
-
-    `fastest` is its greatest speed, in the input's unit per fine step.
-    """
+    """A command on the finer clock, and the data with a plain fit to them."""
 
     fine: Real
-    fastest: float
+    fastest: float  # greatest speed of the command, in the input's unit per fine step
     problem: Problem
     start: Fit
 
     @classmethod
     def of(cls, u: Real, mode: Intersample, problem: Problem, start: Fit) -> "_Followed":
-        """From its samples."""
-        fine = _finely(u, mode)
+        """Take the command from its first sample to its last."""
+        source = prepare_input(u, mode)
+        rest = np.ones(1)
+        steps = [delayed_response(source, delay=-k / _FINE, denominator=rest) for k in range(_FINE)]
+        samples = np.stack([step[0] for step in steps], axis=1)
+        fine = np.asarray(source.first + samples.ravel()[: 1 - _FINE])
         fastest = float(np.max(np.abs(np.diff(fine))))
         return cls(fine=fine, fastest=fastest, problem=problem, start=start)
 
     def at(self, speed: float) -> Problem:
-        """The data with what is followed at this speed in the command's place."""
+        """The data, with the command as it is followed at this speed."""
         rest = self.problem.begins is None
         source = prepare_input(_followed(self.fine, speed), "bandlimited", rest=rest)
         return replace(self.problem, source=source, told=None)
 
     def fit(self, speed: float, *starts: Fit, hopeless: float = np.inf) -> Fit:
-        """The best fit to it from any of the starts."""
+        """The best fit at this speed from any of the starts."""
         data, structure = self.at(speed), self.start.structure
-        fits = (fit_structure(data, structure, one.theta, hopeless=hopeless) for one in starts)
+        fits = (fit_structure(data, structure, start.theta, hopeless=hopeless) for start in starts)
         return min(fits, key=lambda fit: fit.cost)
 
     def slope(self, speed: float, fit: Fit) -> Real:
-        """Derivative of the output with the speed, to a factor."""
+        """Derivative of the output by the speed, up to a factor."""
         step = _STEP * self.fastest
         change = _followed(self.fine, speed + step) - _followed(self.fine, speed - step)
         moved = replace(self.problem, source=prepare_input(change, "bandlimited"), begins=None)
@@ -200,11 +174,11 @@ class _Followed:
 
 
 def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
-    """Of the speeds tried the one that leaves least; None where no limit is near it.
+    """The best of the speeds to try, and its fit; None if there is no limit near it.
 
-    A fit that is to leave more than another kind of model is not followed to its end. Beside the
-    derivative with the speed, as in C. R. Rao's score test (Proc. Cambridge Phil. Soc. 44, 1948),
-    what is left shows what the speeds between those tried can explain.
+    A fit stops early if its cost will stay far above that of the linear model. A fit that includes
+    the derivative by the speed, as in C. R. Rao's score test (Proc. Cambridge Phil. Soc. 44, 1948),
+    shows what speeds between those of the list can explain.
     """
     start, hopeless = command.start, TWICE**2 * best.cost
     speed, least = command.fastest, start
@@ -215,13 +189,13 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
         if fit.cost < least.cost or least is start:
             speed, least = tried, fit
         elif fit.cost > TWICE**2 * least.cost:
-            break  # slower ones leave still more
+            break  # slower ones are worse still
     if least.cost > min(TWICE * best.cost, start.cost):
         return None
     problem = command.at(speed)
-    free = _beside(problem, command.slope(speed, least))
-    beside = fit_structure(free, least.structure, least.theta)
-    if max(_likelier(problem, one, command.problem, best) for one in (least, beside)) <= 0.0:
+    free = _with_row(problem, command.slope(speed, least))
+    fits = (least, fit_structure(free, least.structure, least.theta))
+    if max(_log_odds(problem, fit, command.problem, best) for fit in fits) <= 0.0:
         return None
     return speed, least
 
@@ -229,7 +203,7 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
 def _profiled(
     u: Real, command: _Followed, near: float, least: Fit
 ) -> tuple[LimitedCommand, Fit] | None:
-    """The speed at which the sum of squares is least, and the fit; None where none is near."""
+    """The speed with the least sum of squares, and its fit; None without a minimum nearby."""
     fastest = command.fastest
     at = near / fastest
     found = scipy.optimize.minimize_scalar(
@@ -256,12 +230,11 @@ def _profiled(
 
 
 def beside_speed(joint: JointFit, slope: Real) -> JointFit:
-    """The joint fit with the speed free to move too, so that error bars have room for it.
+    """The joint fit with the speed as one more free parameter, so that error bars include it.
 
-    It is the fit to the command as it is followed; `slope`, (n,), is the derivative of the output
-    with the speed.
+    It fits the followed command; `slope`, (n,), is the derivative of the output by the speed.
     """
-    problem = _beside(joint.problem, slope)
+    problem = _with_row(joint.problem, slope)
     weighed = replace(joint.weighed, nuisance=problem.nuisance)
     structure, theta = joint.best.fit.structure, joint.best.fit.theta
     fit = fit_structure(weighed, structure, theta, precision=weighed.final)
@@ -275,32 +248,23 @@ def beside_speed(joint: JointFit, slope: Real) -> JointFit:
     )
 
 
-def _beside(problem: Problem, slope: Real) -> Problem:
-    """The data with one more row that is free to move."""
-    known = problem.nuisance
-    rows = slope[None] if known is None else np.vstack([known, slope])
-    return replace(problem, nuisance=rows)
-
-
-def _finely(u: Real, mode: Intersample) -> Real:
-    """A command on the finer clock, from its first sample to its last."""
-    source = prepare_input(u, mode)
-    still = np.ones(1)
-    steps = [delayed_response(source, delay=-k / _FINE, denominator=still)[0] for k in range(_FINE)]
-    return np.asarray(source.first + np.stack(steps, axis=1).ravel()[: 1 - _FINE])
+def _with_row(problem: Problem, slope: Real) -> Problem:
+    """The data with one more nuisance row."""
+    rows = () if problem.nuisance is None else problem.nuisance
+    return replace(problem, nuisance=np.vstack([*rows, slope]))
 
 
 @cache
-def _below_half_the_rate() -> Real:
-    """Windowed sinc on the finer clock that keeps what the samples can tell."""
+def _lowpass() -> Real:
+    """Windowed sinc on the finer clock with its cutoff at half the sampling rate."""
     size = 2 * MARGIN * _FINE + 1
     return np.asarray(scipy.signal.firwin(size, 1.0 / _FINE, window=("kaiser", 12.0)))
 
 
 def _followed(fine: Real, step: float) -> Real:
-    """What is followed at so much a fine step, below half the rate, at the samples."""
+    """The command at the samples, as followed at `step` per fine step, low-passed."""
     out = rate_limited(fine, step)
     reach = min(MARGIN * _FINE, out.size - 1)
     longer = np.pad(out, reach, mode="reflect", reflect_type="odd")
-    smooth = scipy.signal.oaconvolve(longer, _below_half_the_rate(), mode="same")
+    smooth = scipy.signal.oaconvolve(longer, _lowpass(), mode="same")
     return np.asarray(smooth[reach : reach + out.size : _FINE])

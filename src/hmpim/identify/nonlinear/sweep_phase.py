@@ -1,8 +1,8 @@
-"""The phase of a swept sine, found from its samples: what its harmonics are measured against.
+"""The phase of a swept sine, found from its samples: the reference for its harmonics.
 
-Zero crossings give the phase at every half turn, whatever the amplitude does in between; a
-smooth curve through them gives the rest. They are looked for at four times the rate, so that
-a sweep may go up to four fifths of the Nyquist frequency.
+Zero crossings give the phase at every half turn, whatever the amplitude does in between, and a
+spline gives it between them. They are found at four times the sampling rate, so that a sweep may
+reach four fifths of the Nyquist frequency.
 """
 
 from dataclasses import dataclass
@@ -20,41 +20,30 @@ _FEWEST_CROSSINGS = 8
 """Four turns at least."""
 
 _FINER = 4
-"""Samples per sample in which crossings are looked for."""
+"""Factor by which the rate is raised to find the crossings."""
 
 _REST = 1e-6
-"""Amplitude over the greatest that is zero: what resampling rings at rest, a scope's touch of zero.
-Crossings then lie apart by more than numbers of 10^8 samples are rounded."""
+"""Amplitude, over the greatest, below which a signal is at rest: ringing of the resampling.
+
+The distance of crossings then exceeds the rounding of times in a record of 10^8 samples.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SweepPhase:
-    """Instantaneous phase of a sweep.
+    """Instantaneous phase of a sweep, all of shape (n,)."""
 
-    Parameters
-    ----------
-    phase : ndarray, shape (n,)
-        Radians; u is about centre + amplitude · cos(phase).
-    frequency : ndarray, shape (n,)
-        Its rate, Hz.
-    amplitude : ndarray, shape (n,)
-        In the input's unit.
-    inside : ndarray of bool, shape (n,)
-        Samples during the sweep itself.
-    """
-
-    phase: Real
-    frequency: Real
-    amplitude: Real
-    inside: Mask
+    phase: Real  # rad; the input is about centre + amplitude * cos(phase)
+    frequency: Real  # Hz
+    amplitude: Real  # in the input's unit
+    inside: Mask  # samples during the sweep itself
 
 
 @kept
 def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
-    """Find the phase of an input, (n,), at a rate in Hz, if it is one sinusoid.
+    """Find the phase of an input, (n,), at a rate in Hz, if it is a single sinusoid.
 
-    Its frequency and its amplitude may vary. None for anything else: several sines, noise, steps, a
-    binary sequence.
+    Frequency and amplitude may vary. None for several sines, noise, steps, a binary sequence.
 
     Examples
     --------
@@ -80,7 +69,7 @@ def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
     error = np.where(inside, (level - np.cos(phase)) ** 2, 0.0)
     inside &= _locally(error, level, crossings) < FEW
     power = float(level[inside] @ level[inside])
-    # Beside one sinusoid of slow amplitude a triangle leaves 1.4 % of its power, a square 19 %.
+    # A sinusoid does not explain 1.4 % of a triangle's power, and 19 % of a square wave's.
     if np.mean(inside) < MOST or float(np.sum(error[inside])) > MATERIAL * power:
         return None
     return SweepPhase(
@@ -92,7 +81,7 @@ def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
 
 
 def _centre(x: Real) -> float:
-    """Middle between neighbouring extremes, the median of all."""
+    """Median of the midpoints between neighbouring extremes."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x))) != 0) + 1
     if turns.size < 4:
         return float(np.mean(x))
@@ -100,7 +89,7 @@ def _centre(x: Real) -> float:
 
 
 def _locally(error: Real, level: Real, crossings: Real) -> Real:
-    """Share of the power left over three half turns around each sample."""
+    """Share of unexplained power in the three half turns around each sample."""
     starts = np.unique(np.clip(np.ceil(crossings).astype(np.intp), 0, error.size - 1))
     sums = np.add.reduceat(np.stack([error, level**2]), starts, axis=1)
     wide = sums.copy()
@@ -112,7 +101,7 @@ def _locally(error: Real, level: Real, crossings: Real) -> Real:
 
 
 def _finer(x: Real) -> Real:
-    """Samples at a multiple of the rate, shape ((n - 1) * finer + 1,); ends continued evenly."""
+    """Samples at a multiple of the rate, shape ((n - 1) * finer + 1,), the ends reflected."""
     margin = min(32, x.size - 1)
     longer = np.pad(x, margin, mode="reflect", reflect_type="odd")
     extended = scipy.signal.resample_poly(longer, _FINER, 1, window=("kaiser", 8.0))
@@ -147,10 +136,8 @@ def _least_beside(values: Real) -> Real:
 
 
 def _signs(fine: Real) -> Real:
-    """Sign of each sample; at rest, and where zero is touched and not crossed, that before it.
-
-    Between two crossings there is then a sample beyond the rest, so that no two coincide.
-    """
+    """Sign of each sample; at rest, and where zero is touched but not crossed, the sign before."""
+    # So two crossings never coincide: a moving sample lies between them.
     moving = np.abs(fine) > _REST * np.abs(fine).max()
     place = np.maximum.accumulate(np.where(moving, np.arange(fine.size), 0))
     place[: np.argmax(moving)] = np.argmax(moving)
@@ -158,7 +145,7 @@ def _signs(fine: Real) -> Real:
 
 
 def _through(crossings: Real, first: float, sample: Real) -> Real:
-    """Phase by a smooth curve through the half turns, going on at the last rate beyond them."""
+    """Phase by a spline through the half turns, continued at the last rate beyond them."""
     turns = first + np.pi * np.arange(crossings.size)
     apart = np.diff(crossings, prepend=-np.inf) > 0.0  # rounding may put two at one instant
     curve = scipy.interpolate.CubicSpline(crossings[apart], turns[apart])

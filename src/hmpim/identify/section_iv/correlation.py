@@ -11,14 +11,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.signals import as_pair
 from hmpim.identify.worth import MOST, NEARLY, PART
 
-__all__ = [
-    "Correlation",
-    "CorrelationPeak",
-    "Likeness",
-    "autocorrelation",
-    "cross_correlation",
-    "likeness",
-]
+__all__ = ["Correlation", "CorrelationPeak", "autocorrelation", "cross_correlation", "likeness"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,47 +32,30 @@ class CorrelationPeak:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Likeness:
-    """How far two signals resemble each other when the output is late, and when it is early."""
+    """How an input and an output correlate when the output is late, and when it is early."""
 
-    # the paper's, of the signals as they are, over the lags at which at least half of the record
-    # overlaps; of the signals less their means where those, at the paper's, resemble each other by
-    # less than half of what they do elsewhere: a bias of many times the motion has its own peak
+    # the paper's peak, of the signals as they are, at lags over which half of the record overlaps;
+    # of the signals less their means, if these correlate less than half as well at the paper's peak
+    # as elsewhere: a bias of many times the motion has a peak of its own
     peak: CorrelationPeak
-    # of the signals less their means, the correlation of largest magnitude where the output comes
-    # first
-    ahead: float
-    behind: tuple[float, float]  # the greatest and the least where it comes last, or at once
-    # lag in samples, from 0 to the longest asked for, at which that correlation has its largest
-    # magnitude
-    lag: int
+    # whether the output leads at the strongest correlation, all without means; False for a sine, an
+    # integral or a derivative, which correlate as much at a lag with the other sign
+    is_ahead: bool
+    lag: int  # samples, from 0 to the longest, at the strongest correlation without means
     there: float  # that correlation, times the number of samples
-    # negative lag, as far at most, at which it is larger still; None if there is none
-    lead: int | None
-
-    @property
-    def is_ahead(self) -> bool:
-        """Whether the output is ahead where the two resemble each other most.
-
-        A sine, an integral or a derivative resembles as much on the other side, with the other
-        sign: then it is not told which is ahead.
-        """
-        sign = -1.0 if self.ahead > 0.0 else 1.0
-        opposite = max(sign * one for one in self.behind)
-        most = max(abs(one) for one in self.behind)
-        return abs(self.ahead) > most and opposite < NEARLY * abs(self.ahead)
+    lead: int | None  # negative lag, as far at most, with a stronger one; None if there is none
 
 
 def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
     """Return the cross-correlation of equation (8), at every lag.
 
-    R_xy(k) = (1/N) Σ x(n) y(n-k), the sum over the n at which both samples exist. Means are
-    not removed and every lag is divided by the same N, both as printed. The sum is done by
-    FFT, with zeros enough that nothing wraps around.
+    R_xy(k) = (1/N) Σ x(n) y(n-k), the sum over the n at which both samples exist. Means are not
+    removed and every lag is divided by the same N, both as printed. The sum is computed by FFT,
+    with enough zeros to prevent wrap-around.
 
-    With y(n-k) as printed, a `y` that is `x` delayed peaks at a negative lag: to read a
-    delay as positive, pass the later signal first. Its peak then is the paper's delay, a whole
-    number of samples: the pure delay plus what the dynamics add, 170 ms for the system of
-    Fig. 17, whose pure delay is 150 ms.
+    With y(n-k) as printed, a `y` that is `x` delayed peaks at a negative lag: pass the later signal
+    first to get a positive delay. Its peak then is the paper's delay in whole samples: the pure
+    delay plus that of the dynamics, 170 ms for the system of Fig. 17, whose pure delay is 150 ms.
 
     Parameters
     ----------
@@ -113,15 +89,15 @@ def cross_correlation(x: ArrayLike, y: ArrayLike) -> Correlation:
 
 @kept
 def likeness(u: Real, y: Real, longest: int) -> Likeness:
-    """Return how an input and an output resemble each other, late and early, in one transform.
+    """Return how an input and an output correlate, late and early, by one transform.
 
-    Both have shape (n,) and are checked; `lag` and `lead` are sought up to the longest.
+    Both have shape (n,) and are checked; `lag` and `lead` go up to the longest.
 
     Examples
     --------
     >>> u, y = np.array([0.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0])
-    >>> seen = likeness(u, y, 4)
-    >>> seen.peak, seen.is_ahead, seen.lag
+    >>> found = likeness(u, y, 4)
+    >>> found.peak, found.is_ahead, found.lag
     (CorrelationPeak(lag=2, value=0.4...), False, 2)
     """
     n, half = u.size, u.size // 2 + 1
@@ -131,7 +107,7 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
     around *= _conjugate(u, length)
     around = scipy.fft.irfft(around, length, overwrite_x=True)
     behind, ahead = around[:n], around[length - n + 1 :]
-    # Of the signals as they are, their means on the samples that meet come in addition.
+    # For the signals as they are, the products of the means are added over the overlap.
     value = behind[:half] + (n - np.arange(half)) * (means[0] * means[1])
     value[1:] -= means[0] * np.cumsum(moves[: half - 1])
     value[1:] -= means[1] * np.cumsum(u[: n - half : -1] - means[0])
@@ -139,10 +115,11 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
     peak, late, early = _peak(value / n), _farthest(behind[:half]), float(ahead[_farthest(ahead)])
     if abs(early) < abs(behind[late]) > abs(behind[peak.lag]) / MOST:
         peak = CorrelationPeak(lag=late, value=float(behind[late]) / n)
+    greatest, least = float(behind.max()), float(behind.min())
+    opposite = -least if early > 0.0 else greatest
     return Likeness(
         peak=peak,
-        ahead=early,
-        behind=(float(behind.max()), float(behind.min())),
+        is_ahead=abs(early) > max(abs(greatest), abs(least)) and opposite < NEARLY * abs(early),
         lag=lag,
         there=float(behind[lag]),
         lead=lead if abs(ahead[lead]) > abs(behind[lag]) else None,
@@ -151,13 +128,13 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
 
 @kept
 def _conjugate(u: Real, length: int) -> Complex:
-    """Conjugate transform of an input less its mean, zeros behind it."""
+    """Conjugate transform of an input less its mean, with zeros appended."""
     spectrum = np.asarray(scipy.fft.rfft(u - u.mean(), length), dtype=np.complex128)
     return np.conj(spectrum, out=spectrum)
 
 
 def _farthest(values: Real) -> int:
-    """Where values, (m,), are farthest from zero, and there first."""
+    """First index at which values, (m,), are farthest from zero."""
     ends = sorted((int(np.argmax(values)), int(np.argmin(values))))
     return max(ends, key=lambda k: abs(float(values[k])))
 
@@ -165,9 +142,8 @@ def _farthest(values: Real) -> int:
 def autocorrelation(x: ArrayLike) -> Correlation:
     """Return the autocorrelation of equation (10), at every lag.
 
-    R_xx(k) = (1/N) Σ x(n) x(n-k): equation (8) of a signal with itself, (n,), its mean not
-    removed; in the paper of the time-corrected measurement error. It is the same at k and -k, and
-    R(0) is the mean square.
+    R_xx(k) = (1/N) Σ x(n) x(n-k): equation (8) of a signal, (n,), with itself, its mean not
+    removed. The paper applies it to the time-corrected measurement error. R(0) is the mean square.
 
     Examples
     --------
@@ -178,11 +154,8 @@ def autocorrelation(x: ArrayLike) -> Correlation:
 
 
 def _peak(value: Real) -> CorrelationPeak:
-    """Peak of a correlation at lags from 0 on, since an output cannot come before its cause.
-
-    The highest value, as in the paper, unless the lowest is 1.2 times as far from zero: then the
-    device turns the sign.
-    """
+    """Peak of a correlation at lags from 0 on, since an output cannot come before its cause."""
     high, low = int(np.argmax(value)), int(np.argmin(value))
+    # As in the paper the highest value, unless the lowest is so much lower: an inverted sign.
     lag = low if -value[low] > (1 + PART) * max(value[high], 0.0) else high
     return CorrelationPeak(lag=lag, value=float(value[lag]))

@@ -1,4 +1,4 @@
-"""Section IV of the paper from end to end: every curve, and every figure read off them."""
+"""Section IV of the paper from end to end: every curve, and every figure from them."""
 
 import math
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from hmpim.identify.arrays import Complex, Mask, Real, median
 from hmpim.identify.kept import kept
 from hmpim.identify.result import PaperEstimates
 from hmpim.identify.section_iv import response as reading
+from hmpim.identify.section_iv import static
 from hmpim.identify.section_iv.correlation import (
     CorrelationPeak,
     autocorrelation,
@@ -28,12 +29,6 @@ from hmpim.identify.section_iv.spectrum import (
     spectrum,
     well_excited,
 )
-from hmpim.identify.section_iv.static import (
-    bias_by_autocorrelation,
-    noise_by_autocorrelation,
-    scale_factor_near_dc,
-    time_corrected_error,
-)
 from hmpim.identify.section_iv.windows import WindowName, window_samples
 from hmpim.identify.signals import as_pair, bins_in, check_band, check_rate, longest_lag
 
@@ -42,18 +37,18 @@ __all__ = ["PaperAnalysis", "estimates_of_many", "paper_analysis", "paper_estima
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PaperAnalysis:
-    """Every curve of the paper's section IV for one record, and what is read off them.
+    """Every curve of the paper's section IV for one record, and the figures from them.
 
     Parameters
     ----------
     fs : float
         Sampling rate, Hz.
     band : tuple of float
-        Excited band, Hz; `response` and what follows from it is given inside it.
+        Excited band, Hz, of `response` and all that follows from it.
     window, alpha
-        The window of the spectra, and its shape where it is Gaussian.
+        The window of the spectra, and its shape if it is Gaussian.
     inverted : bool
-        True if the cross-correlation peaks below zero: the device turns the sign.
+        True if the cross-correlation peaks below zero: the device inverts the sign.
     lag, cross_correlation : ndarray, shape (2n-1,)
         Lags in s, positive for a late output, and equation (8) (Fig. 8).
     error_time, error : ndarray, shape (e,)
@@ -63,7 +58,7 @@ class PaperAnalysis:
     frequency : ndarray, shape (m,)
         Hz, 0 to fs/2, of the four spectra that follow.
     input_db, output_db, input_windowed_db, output_windowed_db : ndarray, shape (m,)
-        Spectra of equation (17) in dB, zeros padded; without and with the window (Fig. 12).
+        Spectra of equation (17) in dB, zero-padded; without and with the window (Fig. 12).
     band_frequency : ndarray, shape (b,)
         Hz, the part of `frequency` inside the band.
     response : complex ndarray, shape (b,)
@@ -73,7 +68,7 @@ class PaperAnalysis:
     phase, phase_without_delay : ndarray, shape (b,)
         Degrees without jumps, equation (23); and with the delay's part (25) removed.
     estimates : PaperEstimates
-        The figures read off these curves.
+        The figures from these curves.
     """
 
     fs: float
@@ -103,15 +98,12 @@ class PaperAnalysis:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Inside:
-    """What section IV.D gives inside a band, (b,), of several outputs, (k, b).
+    """Results of section IV.D inside a band, of several outputs."""
 
-    Figures are read off the bins of `read`, (b,).
-    """
-
-    frequency: Real
-    read: Mask
-    response: Complex
-    phase: Real
+    frequency: Real  # (b,)
+    read: Mask  # (b,): bins that give the figures
+    response: Complex  # (k, b)
+    phase: Real  # (k, b)
 
 
 @checked
@@ -128,15 +120,14 @@ def paper_analysis(
 ) -> PaperAnalysis:
     """Return every step of the paper's section IV, done as printed, with its curves.
 
-    The steps are taken one after another, and what one leaves over spoils the next: the
-    correlation's delay contains what the dynamics add, and with it the error, the bias, the
-    noise and the natural frequency. They are the paper's figures, kept beside better ones.
+    The steps follow one another, and the error of one affects the next: the correlation's delay
+    includes that of the dynamics, which affects the error, the bias, the noise and the natural
+    frequency. They are the paper's figures, for comparison with better ones.
 
-    Two steps are ours. Before the transforms of section IV.D, of which the paper says nothing
-    either way, each signal's mean is taken off. Otherwise the measurement's bias fills the
-    lowest bins, and at an amplitude near the bias the first -90° is found there, at 0.17 Hz
-    instead of 1.53 Hz. `remove_mean=False` leaves it in. And figures are read off only those
-    bins that are `well_excited`.
+    Two steps are ours. Each signal's mean is removed before the transforms of section IV.D, on
+    which the paper says nothing. Otherwise the measurement's bias fills the lowest bins, and at an
+    amplitude near the bias the first -90° is found there, at 0.17 Hz instead of 1.53 Hz;
+    `remove_mean=False` keeps it. And only bins that are `well_excited` give figures.
 
     Parameters
     ----------
@@ -149,7 +140,7 @@ def paper_analysis(
     window, alpha, pad
         As in `spectrum`.
     remove_mean : bool
-        Whether spectra and transfer function are those of the signals without their means.
+        Whether to remove the signals' means before spectra and transfer function.
 
     Returns
     -------
@@ -162,11 +153,10 @@ def paper_analysis(
         For unequal lengths, fewer than four samples, NaN, infinity, or a constant `u`; and
         for an output that is zero throughout.
     ArgumentError
-        For a rate, a band, a window or a padding that cannot be.
+        For an impossible rate, band, window or padding.
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> y = np.concatenate((np.zeros(30), u[:-30])) + 0.6
@@ -182,7 +172,7 @@ def paper_analysis(
     if peak.value == 0.0:
         raise RecordError("the correlation is zero at every lag; one of the signals is dead")
     correlation = cross_correlation(measured, stimulus)
-    told, error = _time_steps(stimulus, measured, peak, fs)
+    estimates, error = _time_steps(stimulus, measured, peak, fs)
     plain = np.stack((stimulus, measured))
     if remove_mean:
         plain -= plain.mean(axis=1, keepdims=True)
@@ -213,21 +203,20 @@ def paper_analysis(
         magnitude=magnitude,
         magnitude_db=decibel(magnitude),
         phase=phase,
-        phase_without_delay=phase - reading.delay_phase(inside.frequency, told.delay or 0.0),
-        estimates=_with_band(told, inside, 0),
+        phase_without_delay=phase - reading.delay_phase(inside.frequency, estimates.delay or 0.0),
+        estimates=_with_band(estimates, inside, 0),
     )
 
 
 def paper_estimates(
     u: ArrayLike, y: ArrayLike, fs: float, band: tuple[float, float] | None = None
 ) -> PaperEstimates:
-    """Return only the figures of `paper_analysis`, at the paper's own settings.
+    """Return only the figures of `paper_analysis`, with the paper's own settings.
 
-    None for each figure whose step has no answer; all None if the output is dead.
+    A figure is None if its step has no answer; all are None if the output is dead.
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> paper_estimates(u, np.roll(u, 30), fs=200.0).delay
@@ -236,9 +225,7 @@ def paper_estimates(
     stimulus, measured = as_pair(u, y)
     check_rate(fs)
     fs = float(fs)
-    span = _band(stimulus, fs, band)
-    (found,) = estimates_of_many(stimulus, [measured], fs, span)
-    return found
+    return estimates_of_many(stimulus, [measured], fs, _band(stimulus, fs, band))[0]
 
 
 def estimates_of_many(
@@ -248,7 +235,6 @@ def estimates_of_many(
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
     >>> late = np.stack([np.roll(u, 30), np.roll(u, 20), np.zeros(2000)])
@@ -263,13 +249,13 @@ def estimates_of_many(
         return found
     peaks = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
     bins, taper = int(band[1] * length / fs) + 2, _taper(n)
-    asked = _asked(u, taper, length, bins)
-    answered = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
+    below = _tapered_input(u, taper, length, bins)
+    above = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
     frequency = np.asarray(np.arange(bins) * (fs / length), dtype=np.float64)
-    inside = _frequency_steps(asked, answered, frequency, band, peaks)
+    inside = _frequency_steps(below, above, frequency, band, peaks)
     for k, (i, peak) in enumerate(zip(moving, peaks, strict=True)):
-        told, _ = _time_steps(u, outputs[i], peak, fs)
-        found[i] = _with_band(told, inside, k)
+        estimates, _ = _time_steps(u, outputs[i], peak, fs)
+        found[i] = _with_band(estimates, inside, k)
     return found
 
 
@@ -279,14 +265,14 @@ def _taper(samples: int) -> Real:
 
 
 def _tapered(x: Real, taper: Real, length: int, bins: int) -> Complex:
-    """First bins of the transform of a signal less its mean, after the paper's window, padded."""
+    """First bins of the padded transform of a signal less its mean, windowed as in the paper."""
     padded = np.zeros(length)
     np.subtract(x, x.mean(), out=padded[: x.size])
     padded[: x.size] *= taper
     return np.array(scipy.fft.rfft(padded)[:bins], dtype=np.complex128)
 
 
-_asked = kept(_tapered)
+_tapered_input = kept(_tapered)
 """The same of a stimulus, kept since all its outputs need it."""
 
 
@@ -302,15 +288,15 @@ def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, 
 def _time_steps(u: Real, y: Real, peak: CorrelationPeak, fs: float) -> tuple[PaperEstimates, Real]:
     """Figures of sections IV.A to IV.C, equations (8) to (14), and the error of equation (9)."""
     lag = min(peak.lag, u.size - 4)
-    error = time_corrected_error(u, y, lag)
-    bias = bias_by_autocorrelation(error)
-    told = PaperEstimates(
+    error = static.time_corrected_error(u, y, lag)
+    bias = static.bias_by_autocorrelation(error)
+    estimates = PaperEstimates(
         delay=lag / fs,
         bias=bias,
-        scale_factor=scale_factor_near_dc(u, y, lag, bias),
-        noise_std=noise_by_autocorrelation(error),
+        scale_factor=static.scale_factor_near_dc(u, y, lag, bias),
+        noise_std=static.noise_by_autocorrelation(error),
     )
-    return told, error
+    return estimates, error
 
 
 def _frequency_steps(
@@ -328,23 +314,23 @@ def _frequency_steps(
     phase = np.zeros(response.shape)
     phase[:, read] = reading.phase(response[:, read], inverted=inverted)
     if not read.all() and read.any():
-        # In a notch the angle is chance: it must not carry a turn into the bins beyond.
+        # In a notch the angle is random: it must not add a turn to the bins beyond.
         near = np.stack([np.interp(frequency, frequency[read], own[read]) for own in phase])
         angle = np.degrees(np.angle(np.where(inverted[:, None], -response, response)))
         phase[:, ~read] = (near + (angle - near + 180.0) % 360.0 - 180.0)[:, ~read]
     return _Inside(frequency=frequency, read=read, response=response, phase=phase)
 
 
-def _with_band(told: PaperEstimates, inside: _Inside, k: int) -> PaperEstimates:
-    """The figures of one output with those that section IV.D reads off its response."""
+def _with_band(estimates: PaperEstimates, inside: _Inside, k: int) -> PaperEstimates:
+    """The figures of one output, with those of section IV.D from its response."""
     frequency, phase = inside.frequency[inside.read], inside.phase[k, inside.read]
     magnitude = np.abs(inside.response[k, inside.read])
     hump = reading.peak_gain(magnitude)
     low = magnitude[: reading.near_dc(magnitude.size)]
     gain = median(low) if low.size else 0.0
-    remaining = phase - reading.delay_phase(frequency, told.delay or 0.0)
+    remaining = phase - reading.delay_phase(frequency, estimates.delay or 0.0)
     return replace(
-        told,
+        estimates,
         natural_frequency=reading.falling_crossing(frequency, remaining, -90.0),
         damping_ratio=None if hump is None else reading.damping_from_hump(hump),
         bandwidth_phase90=reading.falling_crossing(frequency, phase, -90.0),

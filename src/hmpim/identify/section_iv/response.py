@@ -11,32 +11,22 @@ from numpy.typing import ArrayLike
 from hmpim.identify.arrays import Real, median
 from hmpim.identify.worth import FEW
 
-__all__ = [
-    "damping_from_hump",
-    "delay_phase",
-    "falling_crossing",
-    "near_dc",
-    "peak_gain",
-    "phase",
-]
+__all__ = ["damping_from_hump", "delay_phase", "falling_crossing", "near_dc", "peak_gain", "phase"]
 
 
 def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
     """Return the phase φ of equation (23), tan φ = I/R, in degrees and without jumps.
 
-    The arctangent takes the quadrant from the signs of R and I, and the phase is followed
-    from the first frequency upwards, whole turns added so that no step exceeds 180°. Pass
-    the excited band only: outside it the phase is noise, and would carry false turns in. The
-    turns are set so that the lowest twentieth of the band lies, in the median, within 180°
-    of zero.
+    The signs of R and I give the quadrant. The phase is unwrapped from the first frequency upwards,
+    so that no step exceeds 180°. Pass the excited band only: outside it the phase is noise, and
+    would add false turns. The median of the lowest twentieth of the band is within 180° of zero.
 
     Parameters
     ----------
     response : array_like of complex, shape (..., m)
-        G(jω) inside the excited band, frequency increasing, all finite; of many devices at once
-        with an axis before.
+        G(jω) inside the excited band, frequency increasing, finite; many devices along other axes.
     inverted : array_like of bool, shape (...)
-        True for a device that turns the sign: the phase is then that of -G.
+        True for a device that inverts the sign: the phase is then that of -G.
 
     Returns
     -------
@@ -45,7 +35,6 @@ def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
 
     Examples
     --------
-    >>> import numpy as np
     >>> phase(np.exp(-1j * np.radians([10, 110, 210, 310, 410]))).round(6)
     array([ -10., -110., -210., -310., -410.])
     """
@@ -59,21 +48,14 @@ def phase(response: ArrayLike, *, inverted: ArrayLike = False) -> Real:
 
 
 def near_dc(bins: int) -> int:
-    """Return how many of a band's bins count as near DC: the lowest twentieth, at least one.
-
-    Examples
-    --------
-    >>> near_dc(800)
-    40
-    """
-    # "Near DC" is the lowest twentieth of the excited band.
+    """Return how many of a band's bins count as near DC: the lowest twentieth, at least one."""
     return max(math.ceil(FEW * bins), 1)
 
 
 def delay_phase(frequency: ArrayLike, delay: float) -> Real:
     """Return the phase of a pure delay by equation (25): -ω δ, in degrees, shape (m,).
 
-    Frequencies are in Hz, δ in s. Fig. 16 shows a phase less this.
+    Frequencies are in Hz, δ in s. Fig. 16 shows a phase without it.
 
     Examples
     --------
@@ -84,14 +66,14 @@ def delay_phase(frequency: ArrayLike, delay: float) -> Real:
 
 
 def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> float | None:
-    """Return the first frequency at which a curve falls through a level, between the bins too.
+    """Return the first frequency, interpolated linearly, at which a curve falls through a level.
 
     The phase falls through -90° at the effective bandwidth, the paper's basic measure of merit
-    (Fig. 15), and with the delay out at the natural frequency of a quadratic lag (Fig. 16). The
+    (Fig. 15), and without the delay at the natural frequency of a quadratic lag (Fig. 16). The
     magnitude falls through 1/√2 of the gain at DC (-3.01 dB) at the 3 dB bandwidth.
 
-    Frequencies, (m,), increase; the curve, (m,), is finite, a phase without jumps. The answer, Hz,
-    is interpolated linearly; None if the curve starts below the level or never falls through it.
+    Frequencies, (m,), increase; the curve, (m,), is finite, a phase without jumps. None if the
+    curve starts below the level or never falls through it.
 
     Examples
     --------
@@ -112,9 +94,8 @@ def falling_crossing(frequency: ArrayLike, curve: ArrayLike, level: float) -> fl
 def peak_gain(magnitude: ArrayLike) -> float | None:
     """Return the hump of Fig. 16: the greatest magnitude relative to the gain near DC.
 
-    The gain near DC is the median over the lowest twentieth of the band, of |G| inside it, (m,).
-    The ratio is above 1; None if there is no hump: the greatest magnitude is at either end of the
-    band, or no more than what is found near DC.
+    |G| has shape (m,), inside the band; the gain near DC is its median over the lowest twentieth.
+    None if there is no hump: the greatest magnitude is near DC or at the upper end of the band.
 
     Examples
     --------

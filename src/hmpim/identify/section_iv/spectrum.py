@@ -38,8 +38,7 @@ class Spectrum:
     """Discrete Fourier transform of a real signal, its non-negative frequencies."""
 
     frequency: Real  # (m,): Hz, from 0 to at most fs/2
-    # (m,): X of equation (17), in the signal's unit, not divided by the number of samples
-    value: Complex
+    value: Complex  # (m,): X of equation (17), in the signal's unit, not divided by N
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,25 +46,22 @@ class TransferFunction:
     """Ratio of response to stimulus over frequency."""
 
     frequency: Real  # (m,): Hz, increasing
-    # (m,): G(jω), output unit per input unit; NaN where the stimulus has nothing at all
-    response: Complex
+    response: Complex  # (m,): G(jω), output unit per input unit; NaN where the stimulus is 0
 
 
 def padding(samples: int) -> int:
-    """Return the number of zeros that fills a record to about four times its length.
+    """Return the number of zeros that extends a record to about four times its length.
 
     Four times resolves the spectrum between its bins (the paper's picket fence, IV.D.3); from
-    100 000 samples on it is twice, since memory counts. The length is one that the FFT does
-    fast.
+    100 000 samples on it is twice, to save memory. The length suits the FFT.
 
     Examples
     --------
     >>> padding(2000)
     6000
     """
-    return (
-        int(scipy.fft.next_fast_len((4 if samples < _LONG else 2) * samples, real=True)) - samples
-    )
+    times = 4 if samples < _LONG else 2
+    return int(scipy.fft.next_fast_len(times * samples, real=True)) - samples
 
 
 def spectrum(
@@ -79,7 +75,7 @@ def spectrum(
     """Return the transform of equation (17) of the windowed signal, zeros padded after it.
 
     X(k) = Σ x(j) ω_N^((j-1)(k-1)), j = 1 … N, with ω_N = exp(-2πi/N) and N the padded length.
-    The window covers the true signal only; the zeros come after it and are never windowed.
+    The window covers the signal only, not the zeros after it.
 
     Parameters
     ----------
@@ -104,7 +100,7 @@ def spectrum(
     RecordError
         For fewer than four samples, NaN or infinity.
     ArgumentError
-        For an `fs` that is not positive, a negative `pad`, or a window that is not known.
+        For an `fs` that is not positive, a negative `pad`, or an unknown window.
 
     Examples
     --------
@@ -150,17 +146,13 @@ def transfer_function(
 ) -> TransferFunction:
     """Return the paper's transfer function, equation (18): FFT(response) / FFT(stimulus).
 
-    Both signals get the same window and the same zeros, see `spectrum`. Nothing is averaged
-    and nothing is removed first. It is meaningful only where the stimulus has content, see
-    `excited_band`; a late response stands elsewhere under the window than its stimulus, which
-    a window makes worse, not better.
-
-    Stimulus and response, (n,), are on one clock; the rest, and what is refused, is as in
-    `spectrum`.
+    Stimulus and response, (n,), are on one clock and get the same window and the same zeros.
+    Nothing is averaged or removed first. The ratio is meaningful only where the stimulus has
+    content, see `excited_band`. A late response is elsewhere under the window than its stimulus,
+    which makes the window a disadvantage. The other arguments and the errors are as in `spectrum`.
 
     Examples
     --------
-    >>> import numpy as np
     >>> u = np.sin(np.arange(200) ** 2 / 500)
     >>> g = transfer_function(u, -2 * u, fs=100.0)
     >>> bool(np.allclose(g.response, -2))
@@ -173,14 +165,7 @@ def transfer_function(
 
 
 def ratio(y: Complex, u: Complex) -> Complex:
-    """Return y / u, NaN where u is zero.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> ratio(np.array([2 + 0j, 1]), np.array([1 + 0j, 0]))
-    array([ 2. +0.j, nan+nanj])
-    """
+    """Return y / u, NaN where u is zero."""
     out = np.full(y.shape, complex(np.nan, np.nan))
     np.divide(y, u, out=out, where=u != 0)
     return out
@@ -188,17 +173,15 @@ def ratio(y: Complex, u: Complex) -> Complex:
 
 @kept
 def well_excited(u: Complex) -> Mask:
-    """Return which bins of a stimulus's spectrum are no notch between better ones.
+    """Return which bins of a stimulus's spectrum, (m,), are not in a notch.
 
-    Between the lines of a multisine, at the clock's multiples of a held sequence, and at
-    chance in a random one, the stimulus has next to nothing, and the ratio (18) there is noise
-    and leakage. Kept are the bins whose power is at least a tenth of the mean power of the
-    neighbours: a fortieth of all bins on either side, at least 20. The spectrum, (m,), is on
-    consecutive bins.
+    A stimulus has almost no power between the lines of a multisine, at multiples of the clock of a
+    held sequence, and at random bins of a random one. There the ratio (18) is noise and leakage.
+    A bin is well excited if its power is at least a tenth of the mean power of its neighbours: a
+    fortieth of all bins on either side, at least 20. The bins are consecutive.
 
     Examples
     --------
-    >>> import numpy as np
     >>> well_excited(np.array([1.0, 1j, 0.01, -1.0, 1.0]))
     array([ True,  True, False,  True,  True])
     """
@@ -211,14 +194,13 @@ def well_excited(u: Complex) -> Mask:
 def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     """Return the band that a stimulus excites, found from its spectrum.
 
-    Lowest frequency: the first at which |U| is within 12 dB of its greatest. Highest: the
-    last at which the velocity spectrum |f U| is within 12 dB of its greatest. A sweep's
-    position spectrum falls with its extinction, 1/f for n = 1, while its velocity spectrum
-    stays level up to the end of the sweep: so the end shows in the velocity, the start in
-    the position. The spectrum is that of the whole record without its mean, its power
-    averaged over five bins. Left out are bins more than 50 dB below the greatest, and, unless
-    the top twentieth of the spectrum is itself within 30 dB of the greatest, bins less than
-    12 dB above the median there, which is what noise on a measured stimulus leaves.
+    The lowest frequency is the first at which |U| is within 12 dB of its maximum. The highest is
+    the last at which the velocity spectrum |f U| is within 12 dB of its maximum. A sweep's position
+    spectrum falls with its extinction, 1/f for n = 1, while its velocity spectrum stays level up to
+    the end of the sweep: so the velocity shows the end, the position the start. The spectrum is
+    that of the whole record without its mean, its power averaged over five bins. Bins more than
+    50 dB below the maximum do not count. Nor do bins less than 12 dB above the median of the top
+    twentieth, the noise of a measured stimulus, unless that is within 30 dB of the maximum.
 
     Parameters
     ----------
@@ -241,7 +223,6 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(2000) / 200
     >>> low, high = excited_band(np.sin(2 * np.pi * (2 * t + 0.5 * t**2)), fs=200.0)  # 2 to 12 Hz
     >>> 1.5 < low < 2 < 12 < high < 12.7
@@ -257,7 +238,7 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
     value = transform_of(array) if length == n else scipy.fft.rfft(centred, length)
     power = value.real**2 + value.imag**2
     power[0] = 0.0
-    # A running sum of the power, so that lines of a multisine and ripples do not matter.
+    # A running sum of the power smooths the lines of a multisine and ripples.
     running = np.concatenate(([0.0], np.cumsum(np.concatenate(([0, 0], power, [0, 0])))))
     level = np.sqrt(np.maximum(running[5:] - running[:-5], 0.0))
     level[0] = 0.0
@@ -268,7 +249,7 @@ def excited_band(u: ArrayLike, fs: float) -> tuple[float, float]:
 def band_of_levels(level: Real, step: float) -> tuple[float, float]:
     """Excited band in Hz of an amplitude spectrum, by the rules of `excited_band`.
 
-    The spectrum, (m,), is from 0 Hz to half the rate, the mean left out, in steps of Hz.
+    The spectrum, (m,), is from 0 Hz to half the rate, without the mean, in steps of Hz.
 
     Examples
     --------

@@ -1,9 +1,8 @@
-"""Scale factor, bias and noise, the paper's way (equations 9 and 11 to 14), of checked samples."""
+"""Scale factor, bias and noise as in the paper (equations 9 and 11 to 14), from checked samples."""
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.kept import kept
@@ -18,26 +17,15 @@ __all__ = [
 ]
 
 _BEGINNING = 4096
-"""Samples in which the first cycle is looked for, before it is in more."""
+"""Samples in which the first cycle is first searched for."""
 
 
 def time_corrected_error(u: Real, y: Real, lag: int) -> Real:
     """Return the time-corrected measurement error of equation (9): truth minus measurement.
 
-    ε_meas(n) = u(n) - y(n + lag), for the n at which both exist. The paper writes n - δ; the
-    measurement is late, so that its sample to compare with u(n) stands δ later in the record.
-
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        True and measured signal, in one unit.
-    lag : int
-        Processing delay in samples, 0 <= lag < n.
-
-    Returns
-    -------
-    ndarray, shape (n - lag,)
-        Error, in the unit of `u` and `y`.
+    ε_meas(n) = u(n) - y(n + lag), shape (n - lag,), from the true and the measured signal, (n,),
+    and the processing delay in samples. The paper writes n - δ; the measurement is late, so its
+    sample to compare with u(n) is δ later in the record.
 
     Examples
     --------
@@ -51,16 +39,15 @@ def bias_by_autocorrelation(error: Real) -> float:
     """Return the paper's measurement bias K_C of equation (11): the r.m.s. error.
 
     K_C = √R(0), with R the autocorrelation (10) of the time-corrected error (9), shape (n,). This
-    is the bias only if there is nothing else in the error; noise, and all that the dynamics leave
-    over, are in it too (0.68 for the true 0.6 of the paper's Fig. 17). The root has two signs: the
-    one taken is that of the mean of measurement minus truth, as read off Fig. 10.
+    is the bias only if the error contains nothing else; noise and the dynamics add to it (0.68 for
+    the true 0.6 of the paper's Fig. 17). The sign is that of the mean of measurement minus truth.
 
     Examples
     --------
     >>> bias_by_autocorrelation(np.array([-0.6, -0.6, -0.6, -0.6]))
     0.6
     """
-    # R(0) alone needs no transform: it is the mean square, see `autocorrelation`.
+    # R(0), the mean square, needs no transform.
     rms = math.sqrt(float(error @ error) / error.size)
     return -rms if error.mean() > 0 else rms
 
@@ -69,11 +56,10 @@ def bias_by_autocorrelation(error: Real) -> float:
 def initial_period(u: Real) -> int:
     """Return how many samples the first full cycle of the excitation takes, 1 to n.
 
-    The sweep begins near DC, so its first cycle is the "initial period" from which the paper
-    reads the scale factor. The cycle ends where the excitation crosses zero for the second
-    time; crossings within 5 % of the peak are not counted, so that noise on a measured
-    excitation does not end the cycle early. An excitation, (n,), that never completes a cycle,
-    such as a step, is taken whole.
+    The sweep begins near DC, so its first cycle is the "initial period" that gives the paper's
+    scale factor. The cycle ends where the excitation crosses zero for the second time. Crossings
+    within 5 % of the peak do not count, so that noise on a measured excitation does not end the
+    cycle early. An excitation, (n,), without a complete cycle, such as a step, is used whole.
 
     Examples
     --------
@@ -81,46 +67,28 @@ def initial_period(u: Real) -> int:
     101
     """
     threshold = FEW * float(np.max(np.abs(u)))
-    count = min(_BEGINNING, u.size)
-    turns = _turns(u[:count], threshold)
+    count, turns = 0, np.zeros(0, dtype=np.intp)
     while turns.size < 2 and count < u.size:
-        count = min(8 * count, u.size)
-        turns = _turns(u[:count], threshold)
+        count = min(max(8 * count, _BEGINNING), u.size)
+        beyond = np.flatnonzero(np.abs(u[:count]) > threshold)
+        turns = beyond[1:][np.diff(u[beyond] > 0.0)]  # samples that prove a crossing
     if turns.size < 2:
         return u.size
-    # From the sample that proves the second crossing back to the crossing itself.
+    # The crossing itself is before the sample that proves it.
     proof = int(turns[1])
     same_side = u[: proof + 1] * u[proof] > 0
     return proof - int(np.argmin(same_side[::-1])) + 1
 
 
-def _turns(excitation: Real, threshold: float) -> NDArray[np.intp]:
-    """Samples that prove that an excitation has gone to the other side."""
-    beyond = np.flatnonzero(np.abs(excitation) > threshold)
-    return np.asarray(beyond[1:][np.diff(excitation[beyond] > 0.0)])
-
-
 def scale_factor_near_dc(u: Real, y: Real, lag: int, bias: float) -> float | None:
     """Return the paper's scale factor K_ε of equations (12) and (13).
 
-    y(n + lag) = u(n) K_ε + K_C (12) is solved for K_ε at the non-zero points of the initial
-    period (13): those at least half as far from zero as the peak on their side. The mean
-    over the points above zero and the mean over those below count alike, so that what is
-    wrong with `bias` cancels between the two half-cycles.
+    y(n + lag) = u(n) K_ε + K_C (12) is solved for K_ε at the non-zero points of the initial period
+    (13): those at least half as far from zero as the peak on their side. The means above and below
+    zero have equal weight, so that an error of the bias K_C cancels between the two half-cycles.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Excitation and measurement.
-    lag : int
-        Processing delay in samples, 0 <= lag < n.
-    bias : float
-        K_C, in the unit of `y`.
-
-    Returns
-    -------
-    float or None
-        Scale factor, unit of `y` per unit of `u`; None if the excitation is zero throughout.
+    Excitation and measurement have shape (n,), the processing delay `lag` is in samples. None if
+    the excitation is zero throughout.
 
     Examples
     --------
@@ -143,9 +111,9 @@ def scale_factor_near_dc(u: Real, y: Real, lag: int, bias: float) -> float | Non
 def noise_by_autocorrelation(error: Real) -> float:
     """Return the standard deviation of the noise by equation (14): σ² = R(0) - R(∞).
 
-    R(0) is the mean square of the time-corrected error, (n,); R(∞) the square of its mean, as the
-    paper's words have it. Whatever the dynamics leave in the error counts as noise too: 0.32 where
-    0.1 is true in Fig. 17.
+    R(0) is the mean square of the time-corrected error, (n,); R(∞) is the square of its mean, as
+    the paper states. The error due to the dynamics counts as noise too: 0.32 instead of the true
+    0.1 in Fig. 17.
 
     Examples
     --------

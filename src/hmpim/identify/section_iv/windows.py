@@ -1,4 +1,4 @@
-"""Windows that taper a record's ends before its transform (paper, equations 15-16, Fig. 14)."""
+"""Windows that taper the ends of a record before its transform (equations 15-16, Fig. 14)."""
 
 from typing import Literal, get_args
 
@@ -25,17 +25,17 @@ WindowName = Literal[
     "flattop",
     "tukey",
 ]
-"""The Gaussian of equation (15), and the others of the kind that Fig. 14 compares."""
+"""The Gaussian of equation (15), and other windows such as Fig. 14 compares."""
 
-_NARROWEST = 1e100  # of a window: its square is still a number
+_NARROWEST = 1e100  # its square is still finite
 
 
 def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> Real:
     """Return a window by its name, symmetric.
 
     The Gaussian is that of equations (15) and (16): w(n) = exp(-½ [α n / (N/2)]²) for
-    -N/2 <= n <= N/2. That range holds N + 1 points, so a record of `samples` samples has
-    N = samples - 1 and both its ends are at exp(-α²/2).
+    -N/2 <= n <= N/2. That range has N + 1 points, so that N = samples - 1 and both ends are at
+    exp(-α²/2).
 
     Parameters
     ----------
@@ -44,13 +44,8 @@ def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> Rea
     samples : int
         Number of samples, at least 2.
     alpha : float
-        Reciprocal of the width of the Gaussian window, positive; larger tapers the ends more (0.32
-        at α = 1.5). The other windows take none (Tukey tapers half).
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-        The window, without unit, at most 1.
+        Reciprocal of the width of the Gaussian window, positive; a larger one tapers the ends more
+        (0.32 at α = 1.5). The other windows ignore it (Tukey tapers half).
 
     Raises
     ------
@@ -71,7 +66,5 @@ def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> Rea
     if name == "rectangular":
         return np.ones(samples)
     kind = (name, (samples - 1) / (2 * alpha)) if name == "gaussian" else name
-    # A window that must be zero at its ends comes out at -1e-17 there in some of them.
-    return np.asarray(
-        scipy.signal.windows.get_window(kind, samples, fftbins=False), dtype=np.float64
-    )
+    window = scipy.signal.windows.get_window(kind, samples, fftbins=False)
+    return np.asarray(window, dtype=np.float64)
