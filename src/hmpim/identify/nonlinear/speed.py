@@ -7,7 +7,6 @@ clock finer than the samples, since ramps begin between them.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 import scipy
@@ -21,16 +20,14 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
+from hmpim.identify.nonlinear.fine import FINE, finely, sampled
 from hmpim.identify.nonlinear.mechanisms import LONGEST_AUTOREGRESSION, RATES, rate_limited
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import PART, TWICE
-from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
+from hmpim.model.sampled import prepare_input
 from hmpim.record import Finding, Intersample
 
 __all__ = ["LimitedCommand", "beside_speed", "explains_more", "limited_command", "speed_finding"]
-
-_FINE = 8
-"""Steps of the finer clock per sample."""
 
 _LONGEST = 32768
 """Longest record tested, in samples: ramps are computed step by step."""
@@ -83,7 +80,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if near is None:
         return None
     found = _profiled(u, command, *near)
-    speed, least = near if found is None else (found[0].speed / _FINE, found[1])
+    speed, least = near if found is None else (found[0].speed / FINE, found[1])
     other = _Followed.of(u, "foh", problem, start.fit)
     if other.fit(speed, least).cost < TWICE * least.cost:
         both = [each for each in (found, _profiled(u, other, speed, least)) if each]
@@ -145,11 +142,7 @@ class _Followed:
     @classmethod
     def of(cls, u: Real, mode: Intersample, problem: Problem, start: Fit) -> "_Followed":
         """Take the command from its first sample to its last."""
-        source = prepare_input(u, mode)
-        rest = np.ones(1)
-        steps = [delayed_response(source, delay=-k / _FINE, denominator=rest) for k in range(_FINE)]
-        samples = np.stack([step[0] for step in steps], axis=1)
-        fine = np.asarray(source.first + samples.ravel()[: 1 - _FINE])
+        fine = finely(u, mode)
         fastest = float(np.max(np.abs(np.diff(fine))))
         return cls(fine=fine, fastest=fastest, problem=problem, start=start)
 
@@ -219,9 +212,9 @@ def _profiled(
     if curvature <= 0.0:
         return None
     limited = LimitedCommand(
-        speed=_FINE * share * fastest,
-        std=_FINE * fastest * float(np.sqrt(2.0 * fit.cost / command.problem.counted / curvature)),
-        fastest=_FINE * fastest,
+        speed=FINE * share * fastest,
+        std=FINE * fastest * float(np.sqrt(2.0 * fit.cost / command.problem.counted / curvature)),
+        fastest=FINE * fastest,
         values=_followed(command.fine, share * fastest),
         recorded=u,
         slope=command.slope(share * fastest, fit),
@@ -254,17 +247,6 @@ def _with_row(problem: Problem, slope: Real) -> Problem:
     return replace(problem, nuisance=np.vstack([*rows, slope]))
 
 
-@cache
-def _lowpass() -> Real:
-    """Windowed sinc on the finer clock with its cutoff at half the sampling rate."""
-    size = 2 * MARGIN * _FINE + 1
-    return np.asarray(scipy.signal.firwin(size, 1.0 / _FINE, window=("kaiser", 12.0)))
-
-
 def _followed(fine: Real, step: float) -> Real:
     """The command at the samples, as followed at `step` per fine step, low-passed."""
-    out = rate_limited(fine, step)
-    reach = min(MARGIN * _FINE, out.size - 1)
-    longer = np.pad(out, reach, mode="reflect", reflect_type="odd")
-    smooth = scipy.signal.oaconvolve(longer, _lowpass(), mode="same")
-    return np.asarray(smooth[reach : reach + out.size : _FINE])
+    return sampled(rate_limited(fine, step))
