@@ -181,7 +181,7 @@ def listed(names: Sequence[str]) -> str:
     Examples
     --------
     >>> listed(["u", "y"]), listed([])
-    ('u, y', 'none beside time')
+    ('u, y', 'none except time')
     >>> listed([str(k) for k in range(100)])[-24:]
     '17, 18, 19 and 80 others'
     """
