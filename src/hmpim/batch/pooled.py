@@ -21,7 +21,7 @@ from hmpim.batch.request import Request
 from hmpim.batch.rows import group_rows
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification, Statistics, compress, identify
-from hmpim.identify.asked.refusals import check_moves
+from hmpim.identify.preparation.refusals import check_moves
 from hmpim.record import uniform
 
 __all__ = ["Group", "Sums", "identify_groups"]

@@ -7,10 +7,9 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.asked.question import Question
 from hmpim.identify.coupling.output_fit import OutputFit, fit_together
-from hmpim.identify.coupling.output_fit import set_free as set_all_free
-from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
+from hmpim.identify.coupling.output_fit import fit_in_motion as fit_all_in_motion
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
 from hmpim.identify.effects.imperfections import (
@@ -25,8 +24,8 @@ from hmpim.identify.fitting.course import (
     Course,
     completed,
     continued,
+    fit_in_motion,
     free_from_wander,
-    set_free,
     start,
     turn_ahead,
 )
@@ -38,6 +37,7 @@ from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 
@@ -112,7 +112,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
         return None
 
     def steadily(drifted: JointFit) -> JointFit | None:
-        free = set_free(former, drifted.best.fit)
+        free = fit_in_motion(former, drifted.best.fit)
         return None if free is None else chosen_of(free, question.structures)
 
     found = with_plain_drift(former.problem, former.best, with_rows, steadily)
@@ -129,8 +129,8 @@ def _fit_and_look_for_rows(
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
     steady = question.exact or question.intersample == "sampled"
-    drifts = None if steady else partial(_plain_beside_drift, question, seen)
-    fitted = fit_once(question, seen, question.structures, begun=begun, drifts=drifts)
+    fit_drift = None if steady else partial(_plain_beside_drift, question, seen)
+    fitted = fit_once(question, seen, question.structures, begun=begun, fit_drift=fit_drift)
     sampled = len(fitted.fits) > 1 and question.intersample == "sampled"
     if fitted.drifting is not None or fitted.fits[0].silent:
         return fitted
@@ -191,7 +191,7 @@ class _WithRows:
         question, before = self.question, self.latest
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
-        self.latest = fit_once(question, self.seen, names, every, aside=self.unrelated)
+        self.latest = fit_once(question, self.seen, names, every, excluded=self.unrelated)
         if not self.several and not plainly and before is not self.first:
             self.latest = _as_before(question, self.seen, every, before, self.latest)
         found = self.latest.fits[self.asked]
@@ -211,7 +211,7 @@ class _WithRows:
             self.freed = _all_free(question, self.latest, self.asked, hum)
             return None if self.freed is None else self.freed.fits[self.asked]
         course = self.begun or started(question, self.seen, hum)
-        free = set_free(course, drifted.best.fit)
+        free = fit_in_motion(course, drifted.best.fit)
         return None if free is None else chosen_of(free, question.structures)
 
 
@@ -228,7 +228,7 @@ def _as_before(
     course = completed(turn_ahead(started(question, seen, rows)))
     again = refit_between(course.problem, best.fit, best.intersample, course.natural)
     joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    gain = gain_by_rows(joint, 0, rich.fit, found.fits[0].problem)
+    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
     return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
@@ -242,10 +242,10 @@ def _plain_beside_drift(
     plain = OutputFit(fits=(first,))
     freed: OutputFit | None = None
 
-    def with_rows(rows: Real, briefly: bool) -> JointFit:
+    def with_rows(rows: Real, leading_only: bool) -> JointFit:
         nonlocal plain
-        plain = fit_once(question, seen, question.plain, rows, briefly=briefly)
-        return plain.fits[0 if briefly else asked]
+        plain = fit_once(question, seen, question.plain, rows, leading_only=leading_only)
+        return plain.fits[0 if leading_only else asked]
 
     def steadily(_: JointFit) -> JointFit | None:
         nonlocal freed
@@ -263,7 +263,7 @@ def _plain_beside_drift(
     if former.best.fit.is_white and steady.slow is None:
         return None
     count = plain.fits[asked].best.fit.nuisance.size
-    if gain_by_rows(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
+    if criterion_gain(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
         return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=drifting, asked=asked)
@@ -274,7 +274,7 @@ def _all_free(
 ) -> OutputFit | None:
     """Fits of several inputs with a constant bias, from a state that is free."""
     u = [source.values for source in question.aligned.inputs]
-    return set_all_free(fitted, u, question.output.values, asked, rows)
+    return fit_all_in_motion(fitted, u, question.output.values, asked, rows)
 
 
 @kept
@@ -340,14 +340,14 @@ def fit_once(
     rows: Real | None = None,
     *,
     begun: Course | None = None,
-    aside: Mapping[int, JointFit] | None = None,
-    drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
-    briefly: bool = False,
+    excluded: Mapping[int, JointFit] | None = None,
+    fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
+    leading_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
     The search continues from `begun`, if the plain fits to a single input are known. Inputs in
-    `aside` are not fitted; `drifts` and `briefly` are as for `fit_together`.
+    `excluded` are not fitted; `fit_drift` and `leading_only` are as for `fit_together`.
     """
     if begun is not None:
         return OutputFit(fits=(chosen_of(begun, structures),))
@@ -361,7 +361,7 @@ def fit_once(
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
-        aside=aside or {},
-        drifts=drifts,
-        briefly=briefly,
+        excluded=excluded or {},
+        fit_drift=fit_drift,
+        leading_only=leading_only,
     )

@@ -8,21 +8,21 @@ from dataclasses import replace
 from typing import Literal
 
 from hmpim.arguments import checked
-from hmpim.identify.asked.clocks import settled_between
-from hmpim.identify.asked.question import Question, recognise_software
-from hmpim.identify.asked.reference import aligned_with_reference
-from hmpim.identify.asked.refusals import (
+from hmpim.identify.coupling.responses import inputs_of
+from hmpim.identify.fits import fit
+from hmpim.identify.judgement import judged
+from hmpim.identify.kept import keeping
+from hmpim.identify.pair import Described, describe, describe_dead
+from hmpim.identify.preparation.clocks import settled_between
+from hmpim.identify.preparation.question import Question, recognise_software
+from hmpim.identify.preparation.reference import aligned_with_reference
+from hmpim.identify.preparation.refusals import (
     check_moves,
     check_samples,
     check_statistics,
     checked_intersample,
     checked_structures,
 )
-from hmpim.identify.coupling.responses import inputs_of
-from hmpim.identify.fits import fit
-from hmpim.identify.judgement import judged
-from hmpim.identify.kept import keeping
-from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.result import Identification, RecordSummary
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
@@ -174,7 +174,7 @@ def identify_output(question: Question) -> Described:
     seen, fitted = drift_or_levels(question, seen, fitted)
     for _ in range(LOOKS):
         before, seen = seen, look_again(question, seen, fitted)
-        if not seen.counts_otherwise_than(before):
+        if not seen.counts_other_samples_than(before):
             break
         seen, fitted = fit(question, seen)
     fitted = let_gain_change(question, seen, fitted)

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.asked.question import Question
-from hmpim.identify.asked.reference import response_through
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.responses import (
     Responses,
@@ -19,10 +17,10 @@ from hmpim.identify.coupling.responses import (
 )
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import Drifting, drift_findings
+from hmpim.identify.effects.findings import with_imperfections
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
-from hmpim.identify.effects.said import with_imperfections
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.plainer import plainer, taking
 from hmpim.identify.fitting.trial import JointFit
@@ -34,6 +32,8 @@ from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer
 from hmpim.identify.nonlinear.modelled import modelled_finding
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import speed_finding
+from hmpim.identify.preparation.question import Question
+from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std

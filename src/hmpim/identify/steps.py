@@ -6,18 +6,15 @@ from functools import cache
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.asked.question import Question
-from hmpim.identify.asked.reference import fit_through
-from hmpim.identify.asked.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.coupling.output_fit import OutputFit
-from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.imperfections import (
     Imperfections,
     refine,
 )
-from hmpim.identify.effects.lost import stands_out
+from hmpim.identify.effects.lost_samples import stands_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fits import counted_in, fit, fit_once, imperfections_of, started
@@ -36,7 +33,10 @@ from hmpim.identify.nonlinear.modelled import (
     settled_rows,
 )
 from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
-from hmpim.identify.nonlinear.speed import beside_speed, explains_more, limited_command
+from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
+from hmpim.identify.preparation.question import Question
+from hmpim.identify.preparation.reference import fit_through
+from hmpim.identify.preparation.swapped import is_swapped, lags_behind, swapped_finding
 from hmpim.identify.worth import WORTH
 
 __all__ = [
@@ -105,7 +105,7 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     prediction[: first.forgotten] = question.output.values[: first.forgotten]
     again = imperfections_of(question, prediction=prediction)
     again = replace(again, levels=seen.levels, quantization=seen.quantization)
-    informative = again.telling(prediction.size, question.aligned.fs)
+    informative = again.informative(prediction.size, question.aligned.fs)
     if informative is not None and np.ptp(question.output.values[informative]) == 0.0:
         return seen  # all motion would be taken for spikes
     plateau, before = again.saturation, seen.saturation
@@ -204,7 +204,7 @@ def _limit_speed(
         return question, fitted  # levels were found: costs on different samples do not compare
     if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
         return question, fitted
-    return slower, replace(again, fits=(beside_speed(other, limited.slope),))
+    return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
 
 
 def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
@@ -230,7 +230,7 @@ def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputF
         for kind in kinds_in_question(command, problem, course.best, joint.best.fit):
             for one in settled_rows(kind, command, problem, course.best):
                 beside = _with_row(steady, seen, problem, one)
-                gain = gain_by_rows(beside, 1 - known, joint.best.fit, joint.problem)
+                gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
                 if beside.related and leaves_noise(beside, one) and gain > most:
                     kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
                     bending = described(beside, one)

@@ -181,7 +181,7 @@ def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
     u = np.sin(2 * np.pi * (0.1 * T + 0.95 * T**2))
     y = np.convolve(u, np.exp(-np.arange(40) / 8.0) / 8.0)[: T.size] + 0.3 * T
     y = y + 0.02 * np.random.default_rng(4).standard_normal(T.size)
-    monkeypatch.setattr(drift, "gain_by_rows", lambda *_: gain)
+    monkeypatch.setattr(drift, "criterion_gain", lambda *_: gain)
     monkeypatch.setattr(drift, "_passes_for_drift", lambda *_: passes)
     plain = ("first_order",)
     first = joint_fit(u, y, structures=plain)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.effects.lost import find_frozen, find_repeated, find_spikes, find_stuck
+from hmpim.identify.effects.lost_samples import find_frozen, find_repeated, find_spikes, find_stuck
 from tests_support import in_studies
 
 FS = 200.0

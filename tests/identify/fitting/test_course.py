@@ -8,9 +8,9 @@ import pytest
 import hmpim
 from hmpim.identify.fitting.course import (
     find_beginning,
+    fit_in_motion,
     free_from_wander,
     looks_held,
-    set_free,
     start,
     turn_ahead,
 )
@@ -74,6 +74,6 @@ def test_dynamics_set_free_are_weighed_as_they_are_and_not_enriched():
     course = start(u[300:], y[300:], None, None, "bandlimited", (*PLAIN, *RICH), None)
     structure = STRUCTURES["first_order_zero"]
     fit = fit_structure(course.problem, structure, np.array([0.0, np.log(10.0)]))
-    free = set_free(course, fit)
+    free = fit_in_motion(course, fit)
     assert free is not None
     assert (free.others, free.best.structure) == ((), structure)

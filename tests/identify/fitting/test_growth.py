@@ -12,7 +12,7 @@ from hmpim.identify.fitting.growth import (
     grow,
     hidden_pole,
     one_more_pole,
-    seen_by_pole,
+    samples_seen_by_pole,
     with_pole,
 )
 from hmpim.identify.fitting.joint import joint_fit
@@ -177,12 +177,12 @@ def test_noise_that_is_slow_does_not_hide_a_fast_pole(u):
         trial_of("bandlimited", begun, few),
         hidden=lambda trial: hidden_pole(problem, trial.fit),
         refit=refit,
-        count=lambda test, richer: seen_by_pole(problem, test, richer.fit),
+        count=lambda test, richer: samples_seen_by_pole(problem, test, richer.fit),
         names=("third_order",),
         white=lambda trial: False,
     )
     (grown,) = growth.grown
-    seen = seen_by_pole(problem, hidden, grown.fit)
+    seen = samples_seen_by_pole(problem, hidden, grown.fit)
     assert seen > 10.0 * few
     gain = seen * np.log(begun.objective / grown.fit.objective)
     assert gain == pytest.approx((hidden.squared / hidden.std) ** 2, rel=0.3)

@@ -6,7 +6,7 @@ import scipy
 from scipy import signal
 
 import hmpim
-from hmpim.identify.judgement.feedback import chances_of_an_answer
+from hmpim.identify.judgement.feedback import chances_without_feedback
 
 
 def by_regression(u, left, counts, ahead=12):
@@ -29,7 +29,7 @@ def test_the_chance_is_that_of_a_regression(share):
     counts = rng.random(u.size) >= share
     left = rng.standard_normal((2, u.size))
     left[1, :-6] += 0.2 * u[6:]
-    found = chances_of_an_answer(u, left, counts if share else None)
+    found = chances_without_feedback(u, left, counts if share else None)
     wanted = [by_regression(u, one, counts) for one in left]
     assert found == pytest.approx(wanted, rel=1e-6)
     assert found[0] > 1e-3 > 1e-6 > found[1]
@@ -37,7 +37,7 @@ def test_the_chance_is_that_of_a_regression(share):
 
 def test_of_no_records_there_are_no_chances():
     u = np.random.default_rng(4).standard_normal(800)
-    assert chances_of_an_answer(u, np.empty((0, u.size))).shape == (0,)
+    assert chances_without_feedback(u, np.empty((0, u.size))).shape == (0,)
 
 
 def test_even_samples_whose_stamps_jitter_are_no_loop():

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 from hmpim.identify.noise.autoregression import (
     autoregression,
     deviation_of_mean,
-    spectrum_behind,
+    spectrum_of_filter,
     yule_walker,
 )
 from hmpim.identify.noise.whiteness import autocovariance
@@ -19,7 +19,7 @@ NOISE = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(20_
 def test_the_colour_between_gaps() -> None:
     known = np.arange(NOISE.size) % 30 > 8
     omega = np.array([0.01, 0.1, 0.5, 2.0])
-    found = spectrum_behind(autoregression(np.where(known, NOISE, 7.0), known), omega)
+    found = spectrum_of_filter(autoregression(np.where(known, NOISE, 7.0), known), omega)
     np.testing.assert_allclose(found, np.abs(1 - 0.9 * np.exp(-1j * omega)) ** -2, rtol=0.2)
 
 

@@ -29,7 +29,7 @@ from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import bridged
-from hmpim.identify.fitting.data import Seen
+from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import joint_fit
@@ -43,7 +43,7 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "fit_together", "set_free"]
+__all__ = ["OutputFit", "fit_in_motion", "fit_together"]
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -110,9 +110,9 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
-    aside: Mapping[int, JointFit],
-    drifts: Callable[[int, JointFit], OutputFit | None] | None = None,
-    briefly: bool = False,
+    excluded: Mapping[int, JointFit],
+    fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
+    leading_only: bool = False,
 ) -> OutputFit:
     """Fit one output, (n,), to several inputs.
 
@@ -120,26 +120,26 @@ def fit_together(
     `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together. `alike` names
     inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
     coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
-    enter linearly, such as a drift's. Inputs `aside` are left out; each has its unrelated fit.
+    enter linearly, such as a drift's. Inputs `excluded` are left out; each has its unrelated fit.
 
-    If the strong inputs do not leave white noise, richer dynamics may explain a drift: `drifts`
+    If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the leading input and its plain fit, and its value is
-    returned unless it is None. If `briefly`, only strong inputs are fitted, with plain dynamics,
-    and only the leading input's fit is returned.
+    returned unless it is None. If `leading_only`, only strong inputs are fitted, with plain
+    dynamics, and only the leading input's fit is returned.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    pairs = Pairs(y=y, valid=valid, fits={**aside}, strong=[], alike=alike, excluded=aside)
+    pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
     _lead(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
-    if briefly:
+    if leading_only:
         pairs.refine(pairs.kept, None)
         return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
-    if drifts is not None and whitening_of(pairs.residual()) is not None:
-        drifting = drifts(pairs.strong[0], pairs.fits[pairs.strong[0]])
+    if fit_drift is not None and whitening_of(pairs.residual()) is not None:
+        drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
             return drifting
     least = pairs.cost
@@ -169,7 +169,7 @@ def fit_together(
     return _moved_at_once(pairs)
 
 
-def set_free(
+def fit_in_motion(
     fitted: OutputFit, inputs: list[Real], y: Real, moving: int, nuisance: Real | None
 ) -> OutputFit | None:
     """Fit the same dynamics with a free initial state; None unless that leaves white noise.
@@ -182,7 +182,7 @@ def set_free(
         return None
     valid = common(fit.problem.valid for fit in fits.values())
     latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
-    counted = begin_at(Seen(valid=valid, begins=None), max(latest, 0) + REACH, y.size)
+    counted = begin_at(Counted(valid=valid, begins=None), max(latest, 0) + REACH, y.size)
     if counted is None:
         return None
 

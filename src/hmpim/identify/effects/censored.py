@@ -22,7 +22,7 @@ from hmpim.identify.effects.hold import Updates
 from hmpim.identify.effects.saturation import Saturation
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import inverted
-from hmpim.identify.noise.autoregression import autoregression, spectrum_behind
+from hmpim.identify.noise.autoregression import autoregression, spectrum_of_filter
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import NEARLY
 
@@ -339,7 +339,7 @@ def _coloured_scores(state: _State) -> tuple[Real, float]:
     length = scipy.fft.next_fast_len(2 * state.slope.size, real=True)
     spectra = scipy.fft.rfft(weighted, length)
     omega = 2 * np.pi * np.arange(spectra.shape[1]) / length
-    power = spectrum_behind(autoregression(state.slope, state.inside), omega)
+    power = spectrum_of_filter(autoregression(state.slope, state.inside), omega)
     both_signs = np.concatenate([power, power[1:-1]])
     mean = np.mean(both_signs)
     power /= mean

@@ -8,10 +8,10 @@ from hmpim.identify.fitting.fit import FORGETS, Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
-__all__ = ["gain_by_rows", "without_rows"]
+__all__ = ["criterion_gain", "without_rows"]
 
 
-def gain_by_rows(joint: JointFit, count: int, former: Fit, without: Problem) -> float:
+def criterion_gain(joint: JointFit, count: int, former: Fit, without: Problem) -> float:
     """Gain in Schwarz's criterion by adding `count` rows; `former` is the fit without them.
 
     Each residual is modelled as an autoregression over the samples that count in both fits. A

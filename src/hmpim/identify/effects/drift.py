@@ -15,7 +15,7 @@ from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER
-from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
@@ -84,7 +84,7 @@ def with_drift(
     columns = _shape(joint, every)
 
     def gained(joint: JointFit) -> float | None:
-        gain = gain_by_rows(joint, len(columns), first.best.fit, first.problem)
+        gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
         least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
         return None if gain < least else gain
 
@@ -119,7 +119,7 @@ def with_plain_drift(
     joint = fitted(columns, False)
     if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
         return None
-    gain = gain_by_rows(joint, len(columns), fit, problem)
+    gain = criterion_gain(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
     return _unless_steady(joint, columns, steadily, fit if gain < 2 * LIKELIER else None)
@@ -130,7 +130,7 @@ def _unless_steady(
 ) -> tuple[JointFit, Drifting | None]:
     """Subtract the drift from the fit, or return one with a constant bias that explains as much."""
     steady = steadily(joint)
-    if steady and gain_by_rows(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
+    if steady and criterion_gain(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
         return steady, None
     weighed, fit = joint.weighed, joint.best.fit
     weights = fit.nuisance[: len(columns)]

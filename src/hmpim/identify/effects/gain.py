@@ -14,7 +14,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, DEVIATIONS, searched
-from hmpim.identify.effects.disturbance import gain_by_rows
+from hmpim.identify.effects.disturbance import criterion_gain
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -274,7 +274,7 @@ def _settled(
     return _Settled(
         joint=joint,
         score=replace(score, std=_deviation(data, constant, score)),
-        gained=gain_by_rows(
+        gained=criterion_gain(
             replace(joint, best=even), len(score.rows), first.best.fit, first.problem
         ),
         course=course,

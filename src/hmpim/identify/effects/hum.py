@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.effects.disturbance import gain_by_rows, without_rows
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
@@ -57,7 +57,7 @@ def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Hummi
     rows = np.vstack([_rows_of(first, one) for one in frequencies])
     # Lines that are the smaller part of the residual did not hide dynamics.
     joint = fitted(rows, share < MOST and first.best.fit.structure.name in PLAIN)
-    if gain_by_rows(joint, rows.shape[0], first.best.fit, first.problem) < 0.0:
+    if criterion_gain(joint, rows.shape[0], first.best.fit, first.problem) < 0.0:
         return None
     parts = joint.best.fit.nuisance.reshape(-1, _ROWS)
     sizes = np.hypot(parts[:, 0], parts[:, 1])

@@ -15,7 +15,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import BULK, DEVIATIONS
 from hmpim.identify.effects.censored import CensoredFit, fit_censored
 from hmpim.identify.effects.hold import Hold, Updates, detect_hold, updates
-from hmpim.identify.effects.lost import (
+from hmpim.identify.effects.lost_samples import (
     find_frozen,
     find_repeated,
     find_spikes,
@@ -57,7 +57,7 @@ class Imperfections:
     unsure: Mask | None = None  # may be copies of samples that are lost
     levels: int | None = None
 
-    def counts_otherwise_than(self, before: "Imperfections") -> bool:
+    def counts_other_samples_than(self, before: "Imperfections") -> bool:
         """Whether a clipped side or a hold appeared or vanished, or more samples are lost."""
         sides_differ = _sides(self.saturation) != _sides(before.saturation)
         if sides_differ or (self.hold is None) != (before.hold is None):
@@ -81,7 +81,7 @@ class Imperfections:
         """Samples in which a held output is updated."""
         return None if self.hold is None else updates(self.hold, samples, fs)
 
-    def telling(self, samples: int, fs: float) -> Mask | None:
+    def informative(self, samples: int, fs: float) -> Mask | None:
         """Samples that show the output as it was; None if all do."""
         lost = self.lost
         if self.saturation is None and self.hold is None and lost is None:
@@ -99,7 +99,7 @@ class Imperfections:
 
     def counting(self, valid: Mask, fs: float) -> Mask | None:
         """Samples that are valid and show the output as it was; None if all do."""
-        shown = self.telling(valid.size, fs)
+        shown = self.informative(valid.size, fs)
         if bool(valid.all()):
             return shown
         return valid if shown is None else np.asarray(valid & shown)
@@ -291,6 +291,6 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
 
 def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:
     """Samples that count, with clipped and held ones included again."""
-    shown, lost = found.telling(valid.size, fs), found.lost
+    shown, lost = found.informative(valid.size, fs), found.lost
     whole = valid if shown is None else np.asarray(valid | ~shown)
     return whole if lost is None else np.asarray(whole & ~lost)

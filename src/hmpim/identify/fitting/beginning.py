@@ -7,7 +7,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Data, Seen, refit
+from hmpim.identify.fitting.data import Counted, Data, refit
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -51,8 +51,8 @@ def in_motion(u: Real) -> bool:
 
 
 def count_in(
-    data: Data, mode: Intersample, fits: list[Fit], seen: Seen, known: Mask | None
-) -> Seen:
+    data: Data, mode: Intersample, fits: list[Fit], seen: Counted, known: Mask | None
+) -> Counted:
     """Samples that count, once the memory and the delay of the system are known."""
     fit = min(fits, key=lambda f: f.objective)
     # With a negative delay the last samples depend on input after the record.
@@ -66,7 +66,7 @@ def count_in(
     counted[n - ahead :] = False
     if known is not None:
         counted = _of_measured(fit, counted, known)
-    return Seen(valid=counted, begins=begins)
+    return Counted(valid=counted, begins=begins)
 
 
 def _of_measured(fit: Fit, counted: Mask, known: Mask) -> Mask:
@@ -141,8 +141,8 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
 
 
 def look_again(
-    problem: Problem, trial: Trial, seen: Seen, *, lag: int, rests: bool, known: Mask | None
-) -> Seen | None:
+    problem: Problem, trial: Trial, seen: Counted, *, lag: int, rests: bool, known: Mask | None
+) -> Counted | None:
     """Samples that count, now that the structure is known; None if they do not change.
 
     A band-limited input is unknown at the ends of the record: a command that starts from rest has
@@ -215,7 +215,7 @@ def _ringing(count: int, delay: float, reach: int) -> Mask:
     return np.asarray((np.abs(late) <= reach) | (late >= count - 1 - reach))
 
 
-def begin_later(seen: Seen, fit: Fit) -> Seen | None:
+def begin_later(seen: Counted, fit: Fit) -> Counted | None:
     """Samples that count if a fit has a longer delay than earlier ones; None if none drops out.
 
     Samples before the delay answer input before the record, which no free response describes.
@@ -226,12 +226,12 @@ def begin_later(seen: Seen, fit: Fit) -> Seen | None:
     return begin_at(seen, begins, size)
 
 
-def begin_at(seen: Seen, begins: int, size: int) -> Seen | None:
+def begin_at(seen: Counted, begins: int, size: int) -> Counted | None:
     """Samples that counted, from `begins` on; None if that is longer than any delay."""
     if begins > longest_lag(size):
         return None
     late = np.arange(size) >= begins
-    return Seen(valid=late if seen.valid is None else seen.valid & late, begins=begins)
+    return Counted(valid=late if seen.valid is None else seen.valid & late, begins=begins)
 
 
 def _counts(problem: Problem) -> Mask:

@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.candidates import best_of
-from hmpim.identify.fitting.data import RETURNS, TASTE, Data, Fits, Seen, shifted
+from hmpim.identify.fitting.data import RETURNS, TASTE, Counted, Data, Fits, shifted
 from hmpim.identify.fitting.enrich import PLAIN, RICH, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.worth import TWICE
@@ -34,7 +34,7 @@ def fit_under_each_assumption(
     data: Data,
     natural: Intersample,
     fits: list[Fit],
-    seen: Seen,
+    seen: Counted,
     structures: tuple[StructureName, ...],
     *,
     alone: bool,

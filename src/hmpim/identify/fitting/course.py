@@ -18,7 +18,7 @@ from hmpim.identify.fitting.candidates import (
     spans_record,
     sums_to_noise,
 )
-from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -41,10 +41,10 @@ __all__ = [
     "continued",
     "enrich",
     "find_beginning",
+    "fit_in_motion",
     "free_from_wander",
     "is_unanswered",
     "looks_held",
-    "set_free",
     "start",
     "turn_ahead",
 ]
@@ -72,7 +72,7 @@ class Course:
         Input samples that were measured.
     plain, others : tuple of str
         Structures to try first, and the richer ones.
-    given, counted : Seen
+    given, counted : Counted
         The samples as given, and those that count.
     fits : list of Fit
         Fits of the plain structures.
@@ -88,8 +88,8 @@ class Course:
     known: Mask | None
     plain: tuple[StructureName, ...]
     others: tuple[StructureName, ...]
-    given: Seen
-    counted: Seen
+    given: Counted
+    counted: Counted
     fits: list[Fit]
     settled: Fit | None = None
     shared: bool = False
@@ -121,7 +121,7 @@ def start(
     natural: Intersample = "bandlimited" if intersample is None else intersample
     rough = rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size))
     data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance)
-    course = begun(data, natural, structures, Seen(valid=valid, begins=None))
+    course = begun(data, natural, structures, Counted(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
     return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
 
@@ -139,7 +139,7 @@ def _leading_integrators(course: Course) -> list[Fit]:
 
 
 def begun(
-    data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Seen
+    data: Data, natural: Intersample, structures: tuple[StructureName, ...], seen: Counted
 ) -> Course:
     """Fit each plain structure under the natural assumption, the others to be tried later."""
     plain = tuple(name for name in structures if name in PLAIN)
@@ -256,7 +256,7 @@ def find_beginning(course: Course) -> Course:
     return replace(course, fits=_again(course, fits))
 
 
-def _in_motion(course: Course) -> Seen | None:
+def _in_motion(course: Course) -> Counted | None:
     """Samples that count if the record begins in mid-motion; None unless fits then improve clearly.
 
     Fits that assumed rest ended so far off that their own free responses are of no use.
@@ -287,14 +287,14 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     valid, nuisance
         As for `hmpim.identify.fitting.joint.joint_fit`.
     """
-    given = Seen(valid=valid, begins=None)
+    given = Counted(valid=valid, begins=None)
     data = replace(course.data.plain, nuisance=nuisance)
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
 
 
-def set_free(course: Course, fit: Fit) -> Course | None:
+def fit_in_motion(course: Course, fit: Fit) -> Course | None:
     """Fit from mid-motion; None unless that leaves white noise.
 
     Parameters
@@ -329,7 +329,7 @@ def is_unanswered(course: Course, fitted: Fits) -> bool:
     """Whether neither the likelihood nor a test without a model finds an answer."""
     mode, best = min(fitted, key=lambda item: item[1].objective)
     problem = course.data.problem(mode, course.counted)
-    return course.data.says_nothing(problem, best)
+    return course.data.is_unexplainable(problem, best)
 
 
 def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:

@@ -11,7 +11,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse, rough_response
-from hmpim.identify.fitting.unrelated import says_nothing
+from hmpim.identify.fitting.unrelated import is_unexplainable
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.level import level_of
@@ -25,9 +25,9 @@ from hmpim.record import Intersample
 __all__ = [
     "RETURNS",
     "TASTE",
+    "Counted",
     "Data",
     "Fits",
-    "Seen",
     "follows",
     "hopeless_beside",
     "polished",
@@ -51,7 +51,7 @@ prepared = kept(prepare_input)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Seen:
+class Counted:
     """Which samples count, and from which sample an unknown initial state is fitted."""
 
     valid: Mask | None
@@ -85,7 +85,7 @@ class Data:
     level: Real | None = None
     precision: float = PRECISION
 
-    def problem(self, mode: Intersample, seen: Seen) -> Problem:
+    def problem(self, mode: Intersample, seen: Counted) -> Problem:
         """The data under one assumption, with the samples that count."""
         rest = seen.begins is None
         if (mode, rest) not in self.sources:
@@ -133,9 +133,9 @@ class Data:
         """Rough response of a fit's residual."""
         return rough_response(self.u, fit.residual, longest_delay=0, lag=self.rough.lag)
 
-    def says_nothing(self, problem: Problem, fit: Fit, *, least: float = SEARCHED) -> bool:
+    def is_unexplainable(self, problem: Problem, fit: Fit, *, least: float = SEARCHED) -> bool:
         """Whether no model can be expected to explain an output that this fit does not."""
-        return says_nothing(self.u, problem, fit, self.band, least=least)
+        return is_unexplainable(self.u, problem, fit, self.band, least=least)
 
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
         """Test a fit for one more pole."""
@@ -158,7 +158,7 @@ def polished(problem: Problem, fit: Fit) -> Fit:
     return refit(problem, fit, precision=problem.final)
 
 
-def refit_all(data: Data, fitted: Fits, seen: Seen, *, hopeful: float = np.inf) -> Fits:
+def refit_all(data: Data, fitted: Fits, seen: Counted, *, hopeful: float = np.inf) -> Fits:
     """Fit all structures to other data, from where they ended, the leading one first.
 
     A fit that promises a much larger residual than that one, or no smaller one than a plainer fit

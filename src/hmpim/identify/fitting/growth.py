@@ -32,15 +32,15 @@ __all__ = [
     "FEW_POLES",
     "Growth",
     "HiddenPole",
+    "adjusted_for_pole",
     "as_if_hidden",
     "as_if_zero",
     "grow",
     "hidden_pole",
-    "made_room",
     "one_more_pole",
     "response_to_square",
+    "samples_seen_by_pole",
     "scale_of",
-    "seen_by_pole",
     "with_pole",
 ]
 
@@ -218,7 +218,7 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     )
 
 
-def seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
+def samples_seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
     """Independent samples for the response of one more pole, as tested; None in white noise.
 
     Colour elsewhere in the spectrum costs none. The noise is the residual of the `richer` fit,
@@ -272,12 +272,12 @@ def as_if_hidden(fit: Fit, hidden: HiddenPole) -> Fit:
     fit, hidden : Fit, HiddenPole
         The fit without it, and its test by `hidden_pole`.
     """
-    moved = made_room(fit, hidden)
+    moved = adjusted_for_pole(fit, hidden)
     theta = with_pole(fit.structure, moved.theta, hidden.limit)
     return replace(moved, structure=one_more_pole(fit.structure), theta=theta)
 
 
-def made_room(fit: Fit, hidden: HiddenPole) -> Fit:
+def adjusted_for_pole(fit: Fit, hidden: HiddenPole) -> Fit:
     """Return the fit adjusted for that pole, but still without it.
 
     Parameters

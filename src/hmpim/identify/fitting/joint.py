@@ -32,10 +32,16 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.growth import Growth, HiddenPole, grow, one_more_pole, seen_by_pole
+from hmpim.identify.fitting.growth import (
+    Growth,
+    HiddenPole,
+    grow,
+    one_more_pole,
+    samples_seen_by_pole,
+)
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
-from hmpim.identify.fitting.unrelated import UNDENIED
+from hmpim.identify.fitting.unrelated import LEAST_ANSWER
 from hmpim.identify.fitting.whitening import is_contradicted, refit_whitened, weighed_by_noise
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import TWICE
@@ -132,7 +138,7 @@ def settle(
         forgotten=course.counted.first or 0,
         effective_share=share,
         related=not silent
-        and not course.data.says_nothing(weighed.plain, best.fit, least=UNDENIED),
+        and not course.data.is_unexplainable(weighed.plain, best.fit, least=LEAST_ANSWER),
         silent=silent,
     )
 
@@ -260,7 +266,7 @@ def _grown_from(
         # A residual that follows the input is no noise, and its spectrum counts no samples.
         if follows(course.data, richer.fit):
             return count
-        return seen_by_pole(problem, test, richer.fit) or count
+        return samples_seen_by_pole(problem, test, richer.fit) or count
 
     def otherwise(given: Trial) -> float:
         most = given.fit.structure.parameters

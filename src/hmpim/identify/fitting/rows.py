@@ -62,7 +62,7 @@ class Problem:
         are then those of the whitened output. None for white noise.
     noise : ndarray, shape (order + 1,), or None
         Autoregression of the noise, 1 first, by which residual and derivatives are whitened.
-    told : ndarray of bool, shape (n,), or None
+    past_known : ndarray of bool, shape (n,), or None
         With `noise`, the samples that count together with all earlier ones the filter uses.
     level : ndarray, shape (n,), or None
         With `noise`, the level of the whitened noise at each sample, over its geometric mean:
@@ -81,7 +81,7 @@ class Problem:
     shortest_delay: float = STAMPED_LATE
     whitening: Real | None = None
     noise: Real | None = None
-    told: Mask | None = None
+    past_known: Mask | None = None
     level: Real | None = None
     nuisance: Real | None = None
     begins: int | None = None
@@ -100,12 +100,12 @@ class Problem:
     @property
     def plain(self) -> "Problem":
         """The same with noise assumed white."""
-        return replace(self, noise=None, told=None, level=None)
+        return replace(self, noise=None, past_known=None, level=None)
 
     @property
     def counts(self) -> Mask | None:
         """Samples whose residual, whitened if necessary, counts; None when all do."""
-        return self.valid if self.told is None else self.told
+        return self.valid if self.past_known is None else self.past_known
 
     def counting(self, values: Real) -> Real:
         """Return the samples of `values`, (n,), that count."""
@@ -135,8 +135,8 @@ class Problem:
 
         Rows of a span of samples, `here`, are allowed only if the problem is not `filtered`.
         """
-        if self.noise is not None and self.told is not None and rows.size:
-            weight = self.told if self.level is None else self.told / self.level
+        if self.noise is not None and self.past_known is not None and rows.size:
+            weight = self.past_known if self.level is None else self.past_known / self.level
             return np.asarray(scipy.signal.lfilter(self.noise, np.ones(1), rows) * weight)
         counted = rows if self.valid is None else rows * self.valid[here]
         if self.whitening is None:
@@ -156,8 +156,8 @@ class Problem:
         order, size = noise.size - 1, self.y.size
         lost = np.zeros(size, dtype=np.int64) if self.valid is None else np.cumsum(~self.valid)
         before = np.concatenate([np.zeros(order + 1, dtype=np.int64), lost])[:size]
-        told = (lost == before) & (np.arange(size) >= order)
-        return replace(self, noise=noise, told=told, level=level)
+        known = (lost == before) & (np.arange(size) >= order)
+        return replace(self, noise=noise, past_known=known, level=level)
 
     def fixed(self) -> Real:
         """Bias and nuisance, shape (1 + k, n)."""

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
-from hmpim.identify.fitting.unrelated import UNDENIED, says_nothing
+from hmpim.identify.fitting.unrelated import LEAST_ANSWER, is_unexplainable
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.section_iv.correlation import likeness
@@ -246,7 +246,7 @@ def _software_fit(
         trials=tuple(trials),
         forgotten=problem.begins or 0,
         effective_share=share,
-        related=not says_nothing(u, problem, best.fit, (0.0, 0.5), least=UNDENIED),
+        related=not is_unexplainable(u, problem, best.fit, (0.0, 0.5), least=LEAST_ANSWER),
     )
 
 

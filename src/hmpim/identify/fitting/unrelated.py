@@ -14,15 +14,15 @@ from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import TWICE
 
-__all__ = ["UNDENIED", "says_nothing"]
+__all__ = ["LEAST_ANSWER", "is_unexplainable"]
 
-UNDENIED = TWICE * SEARCHED
+LEAST_ANSWER = TWICE * SEARCHED
 """Log-likelihood that an answer must promise, or that a model must gain in innovations.
 
 Twice that of a search by chance: in a coloured residual few samples are independent."""
 
 
-def says_nothing(
+def is_unexplainable(
     u: Real, problem: Problem, fit: Fit, band: tuple[float, float], *, least: float = SEARCHED
 ) -> bool:
     """Whether no model can be expected to explain an output that this fit does not.
@@ -39,7 +39,7 @@ def says_nothing(
     noise = autoregression(problem.masked(y), problem.valid)
     white_u, white_y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (u, y))
     if problem.valid is not None:
-        white_y = white_y * problem.coloured(noise).told
+        white_y = white_y * problem.coloured(noise).past_known
     white_y[: noise.size] = 0.0
     lags = (fit.delay, float(likeness(white_u, white_y, y.size // 2).lag))
     answers = [misfit(white_u, white_y, delay=lag, band=band) for lag in lags]
@@ -59,7 +59,7 @@ def _is_unrelated(problem: Problem, fit: Fit) -> bool:
     if gain >= SEARCHED and problem.begins is None:
         return False
     # A free response may be any sine or exponential: the input must explain more than these.
-    return innovation_gain(y, fit.residual[every]) < UNDENIED
+    return innovation_gain(y, fit.residual[every]) < LEAST_ANSWER
 
 
 def _without_free_response(problem: Problem, fit: Fit) -> Real:

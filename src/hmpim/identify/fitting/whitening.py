@@ -7,7 +7,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Data, Fits, Seen, follows, polished, refit_all
+from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit_all
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
@@ -21,7 +21,7 @@ from hmpim.record import Intersample
 __all__ = ["is_contradicted", "prewhitened_of", "refit_whitened", "weighed_by_noise"]
 
 
-def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -> Data | None:
+def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted) -> Data | None:
     """Data with the noise whitened, if its colour hides the response; None otherwise.
 
     Input and output pass the same filter, so that the response stays the same, and starts are
@@ -40,7 +40,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Seen) -
     if float(innovations @ innovations) > PART * fit.cost:
         return None
     u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
-    y = y if seen.valid is None else y * whitened.told
+    y = y if seen.valid is None else y * whitened.past_known
     rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=longest_lag(data.u.size))
     return replace(data, noise=noise, rough=rough)
 
@@ -60,13 +60,13 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     return replace(data, noise=noise, level=level)
 
 
-def refit_whitened(data: Data, fitted: Fits, seen: Seen) -> Fits:
+def refit_whitened(data: Data, fitted: Fits, seen: Counted) -> Fits:
     """Refit all fits under one noise model, but only evaluate hopeless ones."""
     least = min(fit.objective for _, fit in fitted)
     return refit_all(data, fitted, seen, hopeful=TWICE * least)
 
 
-def is_contradicted(data: Data, best: Trial, seen: Seen) -> bool:
+def is_contradicted(data: Data, best: Trial, seen: Counted) -> bool:
     """Whether whitening moves the estimate farther than noise could.
 
     A right model is estimated without bias, with the noise whitened or not; if the two estimates

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
-from hmpim.identify.effects.lost import stand_out
+from hmpim.identify.effects.lost_samples import stand_out
 from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of, products_of_halves
 from hmpim.identify.fleets.fleet import Fleet, Group
-from hmpim.identify.judgement.feedback import chances_of_an_answer
+from hmpim.identify.judgement.feedback import chances_without_feedback
 from hmpim.identify.judgement.residual import folded_power
 from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonics
@@ -102,7 +102,7 @@ def _unfolded(fleet: Fleet, group: Group, some: Places) -> Mask:
 
 def _unanswered(fleet: Fleet, group: Group, some: Places) -> Mask:
     """Where the stimulus answers nothing of the noise."""
-    return np.asarray(chances_of_an_answer(fleet.u, group.residual[some]) > FALSE_ALARM)
+    return np.asarray(chances_without_feedback(fleet.u, group.residual[some]) > FALSE_ALARM)
 
 
 def _linear(

@@ -29,8 +29,8 @@ from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
 from hmpim.identify.judgement.between_samples import undetermined_between
-from hmpim.identify.judgement.reach import lines_of, unreached
-from hmpim.identify.judgement.structure import barely_told
+from hmpim.identify.judgement.reach import lines_of, unreached_bandwidths
+from hmpim.identify.judgement.structure import barely_distinguished
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import bends, bent_shapes
@@ -307,11 +307,11 @@ def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tu
     found: list[Finding] = []
     missing = [name for name in _BANDWIDTHS if getattr(own, name) is None]
     if missing:
-        found.append(unreached(missing, band_end=fleet.band[1]))
+        found.append(unreached_bandwidths(missing, band_end=fleet.band[1]))
     delay = group.tails.get(k)
     if delay is not None:
         poles = fleet.structure.order + 1
-        found.append(barely_told(fleet.structure.name, poles=poles, delay=delay))
+        found.append(barely_distinguished(fleet.structure.name, poles=poles, delay=delay))
     rivals = sorted(
         (float(other.cost[i]), other) for other, stays in group.others if bool(stays[k])
     )

@@ -18,12 +18,12 @@ verdict          from findings to a verdict for each parameter and for the pair
 from hmpim.identify.judgement.checks import CHECKS, judge
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.failed import attempt
-from hmpim.identify.judgement.verdict import all_doubted, judged, judged_together, unfollowed
+from hmpim.identify.judgement.verdict import all_doubtful, judged, judged_together, unfollowed
 
 __all__ = [
     "CHECKS",
     "Evidence",
-    "all_doubted",
+    "all_doubtful",
     "attempt",
     "judge",
     "judged",

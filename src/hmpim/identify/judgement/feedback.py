@@ -16,7 +16,7 @@ from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 
-__all__ = ["chances_of_an_answer", "feedback"]
+__all__ = ["chances_without_feedback", "feedback"]
 
 _AHEAD = 12
 """Samples of the input's future, and of its past, that are tested."""
@@ -43,7 +43,7 @@ def feedback(evidence: Evidence) -> Iterator[Finding]:
     counts = evidence.joint.weighed.counts
     if counts is not None and np.count_nonzero(counts[_AHEAD:-_AHEAD]) < 10 * _AHEAD:
         return
-    if float(chances_of_an_answer(u, residual[None], counts)[0]) > FALSE_ALARM:
+    if float(chances_without_feedback(u, residual[None], counts)[0]) > FALSE_ALARM:
         return
     if find_period(u) is not None:
         return  # the future of a periodic input is its past
@@ -61,7 +61,7 @@ def feedback(evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def chances_of_an_answer(u: Real, residuals: Real, counts: Mask | None = None) -> Real:
+def chances_without_feedback(u: Real, residuals: Real, counts: Mask | None = None) -> Real:
     """Chances, without a loop, of so strong a relation of residuals to the input's future.
 
     The residuals, (k, n), are of outputs to the input, (n,); all samples count, or those of

@@ -31,7 +31,7 @@ __all__ = [
     "natural_frequency_beyond",
     "negative_delay",
     "short_record",
-    "unreached",
+    "unreached_bandwidths",
 ]
 
 _LOBE = 4
@@ -187,10 +187,10 @@ def beyond_band(evidence: Evidence) -> Iterator[Finding]:
     missing = [name for name in expected if getattr(p, name) is None]
     if structure.integrators or structure.dc_zeros or not missing:
         return
-    yield unreached(missing, band_end=evidence.band[1])
+    yield unreached_bandwidths(missing, band_end=evidence.band[1])
 
 
-def unreached(missing: Sequence[str], *, band_end: float) -> Finding:
+def unreached_bandwidths(missing: Sequence[str], *, band_end: float) -> Finding:
     """Name the bandwidths that a band with this end in Hz does not reach."""
     return Finding(
         code="beyond_band",

@@ -11,7 +11,7 @@ from hmpim.identify.result.groups import PHASE_SPLIT
 from hmpim.identify.worth import MOST, TOLERATED
 from hmpim.record import Finding
 
-__all__ = ["ALMOST", "barely_told", "missed_pole", "other_order"]
+__all__ = ["ALMOST", "barely_distinguished", "missed_pole", "other_order"]
 
 ALMOST = DEVIATIONS - 1.0
 """Standard deviations from which another run may require other dynamics."""
@@ -29,7 +29,7 @@ def other_order(evidence: Evidence) -> Iterator[Finding]:
     rival, ahead = joint.rivals[0].fit, joint.best.criterion - joint.rivals[0].criterion
     best, late = joint.best.fit.structure, rival.delay / evidence.fs
     if ahead <= 2 * LIKELIER:
-        yield barely_told(best.name, poles=rival.structure.order, delay=late)
+        yield barely_distinguished(best.name, poles=rival.structure.order, delay=late)
         return
     yield Finding(
         code="other_dynamics",
@@ -60,7 +60,7 @@ def _plainer(evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def barely_told(chosen: str, *, poles: int, delay: float) -> Finding:
+def barely_distinguished(chosen: str, *, poles: int, delay: float) -> Finding:
     """Say that a structure with one more pole, and a delay in s, is as likely as the chosen one."""
     return Finding(
         code="structure",

@@ -15,7 +15,7 @@ from hmpim.identify.result.estimate import ParameterVerdict
 from hmpim.identify.result.groups import EVERY
 from hmpim.record import Finding
 
-__all__ = ["UNKNOWN", "all_doubted", "doubted", "judged", "judged_together", "unfollowed"]
+__all__ = ["UNKNOWN", "all_doubtful", "doubted", "judged", "judged_together", "unfollowed"]
 
 H = TypeVar("H", Parameters, ResponseBandwidths)
 
@@ -86,7 +86,7 @@ def judged_together(
     return _weighed(mean, doubtful=doubtful)
 
 
-def all_doubted(parameters: Parameters) -> Parameters:
+def all_doubtful(parameters: Parameters) -> Parameters:
     """Return the parameters, all of them doubtful."""
     return _all_weighed(parameters, frozenset(EVERY))
 

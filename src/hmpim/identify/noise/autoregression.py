@@ -24,7 +24,7 @@ __all__ = [
     "autoregressive_spectrum",
     "deviation_of_mean",
     "innovation_gain",
-    "spectrum_behind",
+    "spectrum_of_filter",
     "whitening_filter",
     "yule_walker",
 ]
@@ -166,7 +166,7 @@ def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
     return noise, float(noise @ gram[: noise.size, : noise.size] @ noise)
 
 
-def spectrum_behind(noise: Real, omega: Real) -> Real:
+def spectrum_of_filter(noise: Real, omega: Real) -> Real:
     """Power spectrum of noise that a filter whitens to a power of 1, at radians per sample."""
     return np.asarray(np.abs(np.exp(-1j * np.outer(omega, np.arange(noise.size))) @ noise) ** -2)
 
@@ -177,7 +177,7 @@ def autoregressive_spectrum(residual: Real, omega: Real) -> Real:
     Equal to the variance at every frequency if the noise is white.
     """
     noise, innovation = yule_walker(residual)
-    power = innovation * spectrum_behind(noise, omega)
+    power = innovation * spectrum_of_filter(noise, omega)
     at = omega * residual.size / (2 * np.pi)
     low = at <= _low_bins(residual).size
     weights, kinds = _kinds(residual, noise, innovation, at[low])
@@ -227,7 +227,7 @@ def _kinds(residual: Real, noise: Real, innovation: float, at: Real) -> tuple[Re
     `innovation` are from `yule_walker`.
     """
     n, bins, at = residual.size, _low_bins(residual), np.maximum(at, 0.5)
-    behind = innovation * spectrum_behind(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
+    behind = innovation * spectrum_of_filter(noise, 2 * np.pi * np.concatenate([bins, at]) / n)
     power = np.abs(scipy.fft.rfft(residual)[1 : bins.size + 1]) ** 2 / n
     if not power.any() or not behind.all():
         return np.ones(1), behind[None, bins.size :]

@@ -27,7 +27,7 @@ from hmpim.identify.worth import PART, TWICE
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Finding, Intersample
 
-__all__ = ["LimitedCommand", "beside_speed", "explains_more", "limited_command", "speed_finding"]
+__all__ = ["LimitedCommand", "explains_more", "limited_command", "speed_finding", "with_free_speed"]
 
 _LONGEST = 32768
 """Longest record tested, in samples: ramps are computed step by step."""
@@ -150,7 +150,7 @@ class _Followed:
         """The data, with the command as it is followed at this speed."""
         rest = self.problem.begins is None
         source = prepare_input(_followed(self.fine, speed), "bandlimited", rest=rest)
-        return replace(self.problem, source=source, told=None)
+        return replace(self.problem, source=source, past_known=None)
 
     def fit(self, speed: float, *starts: Fit, hopeless: float = np.inf) -> Fit:
         """The best fit at this speed from any of the starts."""
@@ -222,7 +222,7 @@ def _profiled(
     return limited, fit
 
 
-def beside_speed(joint: JointFit, slope: Real) -> JointFit:
+def with_free_speed(joint: JointFit, slope: Real) -> JointFit:
     """The joint fit with the speed as one more free parameter, so that error bars include it.
 
     It fits the followed command; `slope`, (n,), is the derivative of the output by the speed.

@@ -17,7 +17,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER, SEEN
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.growth import as_if_hidden, as_if_zero, made_room
+from hmpim.identify.fitting.growth import adjusted_for_pole, as_if_hidden, as_if_zero
 from hmpim.identify.fitting.held_steps import at_ends, steps_through
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
@@ -155,7 +155,7 @@ def spanned(
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
         if set(fit.structure.sections) == {1, 2}:  # the pole joins the real one, and is no mode
-            room = figures_of(made_room(fit, hidden), fs=fs, highest=highest)
+            room = figures_of(adjusted_for_pole(fit, hidden), fs=fs, highest=highest)
             longest |= {name: room[name] for name in ("natural_frequency", "damping_ratio")}
         richer.append({name: longest[name] for name in (*PHASE_SPLIT, "bandwidth_3db")})
     if hidden is not None and abs(hidden.squared) > HALF * hidden.std and hidden.fit is fit:

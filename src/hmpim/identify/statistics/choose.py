@@ -9,7 +9,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, SEARCHED
 from hmpim.identify.fitting.course import Course, begun, looks_held
-from hmpim.identify.fitting.data import Data, Seen, refit
+from hmpim.identify.fitting.data import Counted, Data, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
@@ -51,7 +51,7 @@ _TASTE = 5
 _LOOKS = 3
 """How often it is asked which samples at the ends count."""
 
-_ALL = Seen(valid=None, begins=None)
+_ALL = Counted(valid=None, begins=None)
 """No selection: the products hold only samples that count."""
 
 
@@ -84,7 +84,7 @@ class CompressedData(Data):
             excited=(low / statistics.fs, high / statistics.fs),
         )
 
-    def problem(self, mode: Intersample, seen: Seen) -> Compressed:
+    def problem(self, mode: Intersample, seen: Counted) -> Compressed:
         """The products under one assumption, and the noise model."""
         if (mode, True) not in self.sources:
             self.sources[mode, True] = pulse(self.products.statistics.reach, mode)
@@ -118,7 +118,7 @@ class CompressedData(Data):
         known = as_fitted(fit).response
         return rough_of(self.products.statistics, known=known, lag=self.rough.lag)
 
-    def says_nothing(self, problem: Problem, fit: Fit, *, least: float = 0.0) -> bool:
+    def is_unexplainable(self, problem: Problem, fit: Fit, *, least: float = 0.0) -> bool:
         """Whether a constant explains as much, and what is left over does not follow the input."""
         share = 1.0 if as_fitted(fit).products.order else fit.share
         spread = as_fitted(fit).products.energy

@@ -8,7 +8,7 @@ import numpy as np
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
-from hmpim.identify.noise.autoregression import spectrum_behind
+from hmpim.identify.noise.autoregression import spectrum_of_filter
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.statistics.beyond import UNDELAYED
 from hmpim.identify.statistics.fit import Compressed, as_fitted, pulse
@@ -31,7 +31,7 @@ def drift_or_noise(evidence: Evidence) -> Iterator[Finding]:
     fit = as_fitted(evidence.joint.best.fit)
     lags = fit.products.statistics.lags
     omega = np.geomspace(_SLOWEST, np.pi, _FREQUENCIES)
-    power = spectrum_behind(fit.left.noise, omega)
+    power = spectrum_of_filter(fit.left.noise, omega)
     slow = np.where(omega < 2 * np.pi / lags, power, 0.0)
     share = float(np.trapezoid(slow, omega) / np.trapezoid(power, omega))
     if share <= MOST:

@@ -13,7 +13,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.start import starting_values
 from hmpim.identify.fitting.trial import trial_of
-from hmpim.identify.judgement import all_doubted
+from hmpim.identify.judgement import all_doubtful
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.result import Identification, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
@@ -268,7 +268,7 @@ def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bo
     outside = natural is not None and not 1.0 / time < natural.value < PAST * highest
     if not (follows or outside):
         return parameters
-    return all_doubted(parameters)
+    return all_doubtful(parameters)
 
 
 def _begun(statistics: Statistics, intersample: Intersample) -> Fit:

@@ -3,7 +3,7 @@
 import numpy as np
 
 import hmpim
-from hmpim.identify.asked.question import Question
+from hmpim.identify.preparation.question import Question
 from hmpim.record import uniform
 
 SAMPLES = 1200

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.identify.asked.reference import instrument_of
+from hmpim.identify.preparation.reference import instrument_of
 from tests_support import assert_share
 
 FS, N = 200.0, 2000

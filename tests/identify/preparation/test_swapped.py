@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.asked.swapped import is_swapped
+from hmpim.identify.preparation.swapped import is_swapped
 from tests_support import assert_share, in_studies
 
 FS = 200.0

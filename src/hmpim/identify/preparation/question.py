@@ -9,11 +9,11 @@ from typing import cast
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.asked.reference import Instrument
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.software import is_exact, software_fit
 from hmpim.identify.nonlinear.speed import LimitedCommand
+from hmpim.identify.preparation.reference import Instrument
 from hmpim.identify.result import InputSet
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import ROUNDING, TWICE
