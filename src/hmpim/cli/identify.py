@@ -67,6 +67,13 @@ class Between(StrEnum):
     SAMPLED = "sampled"
 
 
+class Kept(StrEnum):
+    """What becomes of a nonlinearity."""
+
+    MODELLED = "modelled"
+    REPORTED = "reported"
+
+
 def identify(
     records: Annotated[
         list[Path],
@@ -116,6 +123,15 @@ def identify(
             help="Channel that drives a loop around the unit: identify the unit through it.",
         ),
     ] = None,
+    nonlinear: Annotated[
+        Kept,
+        typer.Option(
+            "--nonlinear",
+            help="What becomes of backlash, a dead zone, friction or a spring. modelled: part of "
+            "the model, with the linear part's figures; reported: named only, with the figures of "
+            "the best linear model at this amplitude.",
+        ),
+    ] = Kept.MODELLED,
     holdout: Annotated[
         float | None,
         typer.Option(
@@ -182,6 +198,7 @@ def identify(
     single |= {"--holdout": holdout, "--at": at or None}
     single |= {"--structure": structure or None, "--hand": hand or None}
     single["--reference"] = reference
+    single["--nonlinear"] = None if nonlinear is Kept.MODELLED else nonlinear.value
     by_hand = _by_hand(hand or [])
     if together:
         named = (_once(input_, "--input"), _once(output, "--output"))
@@ -249,6 +266,7 @@ def identify(
             intersample=intersample.value,
             structures=_structures(structure),
             reference=reference,
+            nonlinear=nonlinear.value,
         )
     said = [] if held is None else _predictions(result, given[0], held)
     said += _readings(result, at or [])

@@ -12,6 +12,7 @@ from hmpim.identify.coupling.responses import inputs_of
 from hmpim.identify.fits import fit
 from hmpim.identify.judgement import judged
 from hmpim.identify.kept import keeping
+from hmpim.identify.nonlinearities import model_nonlinearity
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.preparation.clocks import settled_between
 from hmpim.identify.preparation.question import Question, recognise_software
@@ -32,7 +33,6 @@ from hmpim.identify.steps import (
     look,
     look_again,
     mark_swapped,
-    model_nonlinearity,
     through_reference,
 )
 from hmpim.identify.threads import one_thread

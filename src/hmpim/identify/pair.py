@@ -21,17 +21,18 @@ from hmpim.identify.effects.findings import with_imperfections
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
-from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.plainer import plainer, taking
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.plainer import plainer
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
 from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
-from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
+from hmpim.identify.nonlinear.bends import Bend
 from hmpim.identify.nonlinear.modelled import modelled_finding
-from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
+from hmpim.identify.nonlinear.nonlinearity import Inspection
 from hmpim.identify.nonlinear.speed import speed_finding
+from hmpim.identify.nonlinearities import looked_through, possible_bends
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
@@ -42,6 +43,7 @@ from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
     Candidate,
     FrequencyResponse,
+    Nonlinearity,
     OutputCoherence,
     PairIdentification,
     PaperEstimates,
@@ -51,7 +53,7 @@ from hmpim.identify.result import (
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
-from hmpim.identify.worth import ROUNDING, WORTH
+from hmpim.identify.worth import WORTH
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -113,10 +115,11 @@ def _pair(
     """Describe an output that follows an input."""
     aligned, output = question.aligned, question.output
     source, band = aligned.inputs[i], question.band(i)
+    units = source.unit, output.unit
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
-    joint, inspection, unseen = _looked_through(question, found, joined, joint, i, plain)
-    said = () if inspection is None else _not_modelled(inspection.findings, joined)
+    joint, inspection, unseen = looked_through(question, found, joined, joint, i, plain)
+    said = () if inspection is None else inspection.findings
     command = source.values if question.limited is None else question.limited.recorded
     y = output.values if matrix is None else joint.problem.y
     paper = paper_estimates(command, y, aligned.fs, band=band)
@@ -133,7 +136,9 @@ def _pair(
         _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
     )
     none: tuple[Bend, ...] = ()
-    moves, unmoved = attempt("bends", lambda: _bends(question, found, joint, i, plain, said), none)
+    moves, unmoved = attempt(
+        "bends", lambda: possible_bends(question, found, joint, i, plain, said), none
+    )
     from_response, unread = attempt(
         "response_bandwidths",
         lambda: _bandwidths(question, joint, readings, response, i, matrix),
@@ -155,7 +160,7 @@ def _pair(
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *_disturbances(question, joined, source.unit, white=readings.white),
+        *_disturbances(question, joined, units, white=readings.white),
         *(*unseen, *unmoved, *unread, *untested),
     )
     fit = joint.best.fit
@@ -180,8 +185,16 @@ def _pair(
         prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
         residual=fit.residual if course is None else fit.residual * course,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
-        nonlinearity=None if inspection is None else inspection.summary,
+        nonlinearity=None if inspection is None else _summary(inspection, joined, units),
     )
+
+
+def _summary(inspection: Inspection, joined: OutputFit, units: tuple[str, str]) -> Nonlinearity:
+    """What is nonlinear; its kind and size as the model has them, if it includes them."""
+    summary, modelled = inspection.summary, joined.bending
+    if modelled is None:
+        return summary
+    return replace(summary, kinds=(modelled.kind,), size=modelled.estimate(units))
 
 
 def _found_before(question: Question, unit: str) -> list[Finding]:
@@ -193,7 +206,7 @@ def _found_before(question: Question, unit: str) -> list[Finding]:
 
 
 def _disturbances(
-    question: Question, joined: OutputFit, input_unit: str, *, white: bool
+    question: Question, joined: OutputFit, units: tuple[str, str], *, white: bool
 ) -> list[Finding]:
     """Findings about a drift, hum and a nonlinearity that the model includes."""
     fs, unit = question.aligned.fs, question.output.unit
@@ -203,7 +216,7 @@ def _disturbances(
     if joined.humming is not None:
         found.append(hum_finding(joined.humming, fs, unit))
     if joined.bending is not None:
-        found.append(modelled_finding(joined.bending, (input_unit, unit)))
+        found.append(modelled_finding(joined.bending, units))
     return found
 
 
@@ -321,105 +334,6 @@ def _refined(
     if refined is None:
         return joint, None, covariance
     return *refined, refined[1].covariance
-
-
-def _not_modelled(said: tuple[Finding, ...], joined: OutputFit) -> tuple[Finding, ...]:
-    """Findings about a nonlinearity; without doubt, and without its kind, if the model has it."""
-    if joined.bending is None:
-        return said
-    general = (finding for finding in said if finding.code == "nonlinear")
-    return tuple(replace(finding, severity="info", parameters=()) for finding in general)
-
-
-def _looked_through(
-    question: Question,
-    found: Imperfections,
-    joined: OutputFit,
-    joint: JointFit,
-    i: int,
-    plain: Fit | None,
-) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
-    """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity."""
-    if joined.bending is not None:
-        whole = joined.bending.as_measured(joint)
-        inspection, unseen = attempt(
-            "nonlinearity", lambda: _inspected(question, found, *whole, i, None), None
-        )
-        return joint, inspection, unseen
-    inspection, unseen = attempt(
-        "nonlinearity",
-        lambda: _inspected(question, found, joint.problem, joint.best.fit, i, plain),
-        None,
-    )
-    if inspection is not None and inspection.fit is not joint.best.fit:
-        return taking(joint, inspection.fit), inspection, unseen
-    if plain is None:
-        return joint, inspection, unseen
-    bent_instead, untried = attempt("bends", lambda: _is_bent(question, found, joint, plain), False)
-    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
-
-
-def _inspected(
-    question: Question, found: Imperfections, problem: Problem, fit: Fit, i: int, plain: Fit | None
-) -> Inspection | None:
-    """The nonlinear part of the residual; not tested in a loop."""
-    if question.instrument is not None:
-        return None
-    aligned, output = question.aligned, question.output
-    source = aligned.inputs[i]
-    return inspect_nonlinearity(
-        source.values,
-        problem,
-        fit,
-        fs=aligned.fs,
-        plain=plain,
-        others=[other.values for other in aligned.inputs if other is not source],
-        floor=_floor(question, found),
-        unit=output.unit,
-    )
-
-
-def _floor(question: Question, found: Imperfections) -> float:
-    """R.m.s. of the rounding error, by the steps of the output or of the arithmetic."""
-    return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
-
-
-def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
-    """Whether a plain fit and a nonlinearity replace a rich one; not tested in a loop."""
-    if question.instrument is not None or joint.best.fit.structure.sampled:
-        return False
-    return is_bent_instead(
-        question.aligned.inputs[0].values,
-        joint.problem,
-        joint.best.fit,
-        plain,
-        intersample=joint.best.intersample,
-        fs=question.aligned.fs,
-        floor=_floor(question, found),
-    )
-
-
-def _bends(
-    question: Question,
-    found: Imperfections,
-    joint: JointFit,
-    i: int,
-    plain: Fit | None,
-    said: tuple[Finding, ...],
-) -> tuple[Bend, ...]:
-    """How far a nonlinearity may have moved the figures; not tested where it made all doubtful.
-
-    Nor with several inputs, in a loop, or for software.
-    """
-    best, fs = joint.best, question.aligned.fs
-    doubted = any(finding.severity == "doubt" for finding in said)
-    alone = question.inputs is None and question.instrument is None
-    if doubted or not alone or best.fit.structure.sampled:
-        return ()
-    u = question.aligned.inputs[i].values
-    floor = _floor(question, found)
-    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, fs=fs, floor=floor)
-    return (*own, *plainer_bends(u, joint, plain, fs=fs, floor=floor))
 
 
 def _measured(

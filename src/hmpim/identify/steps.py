@@ -6,9 +6,7 @@ from functools import cache
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY
 from hmpim.identify.coupling.output_fit import OutputFit
-from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -17,27 +15,16 @@ from hmpim.identify.effects.imperfections import (
 from hmpim.identify.effects.lost_samples import stands_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fits import counted_in, fit, fit_once, imperfections_of, started
-from hmpim.identify.fitting.course import Course, completed, continued, turn_ahead
+from hmpim.identify.fits import counted_in, fit_once, imperfections_of, started
+from hmpim.identify.fitting.course import Course, continued, turn_ahead
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.modelled import (
-    described,
-    is_explained,
-    kinds_in_question,
-    leaves_noise,
-    settled_rows,
-)
-from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
-from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import fit_through
 from hmpim.identify.preparation.swapped import is_swapped, lags_behind, swapped_finding
-from hmpim.identify.worth import WORTH
 
 __all__ = [
     "drift_or_levels",
@@ -45,7 +32,6 @@ __all__ = [
     "look",
     "look_again",
     "mark_swapped",
-    "model_nonlinearity",
     "through_reference",
 ]
 
@@ -164,88 +150,6 @@ def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) 
         return fitted
     fits = (found.joint,) if found.taken else fitted.fits
     return replace(fitted, fits=fits, gaining=found)
-
-
-def model_nonlinearity(
-    question: Question, seen: Imperfections, fitted: OutputFit
-) -> tuple[Question, OutputFit]:
-    """Limit the speed of the command, or add a row for another nonlinearity, if that explains more.
-
-    Only for a single input that the output follows; not for loops and software.
-    """
-    joint = fitted.fits[0]
-    if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
-        return question, fitted
-    if question.linear:
-        return question, fitted
-    question, fitted = _limit_speed(question, seen, fitted)
-    if question.limited is not None:
-        return question, fitted
-    return question, _with_nonlinear_row(question, seen, fitted)
-
-
-def _limit_speed(
-    question: Question, seen: Imperfections, fitted: OutputFit
-) -> tuple[Question, OutputFit]:
-    """Limit the speed of the command if that explains more."""
-    joint, aligned = fitted.fits[0], question.aligned
-    (source,) = aligned.inputs
-    limited = limited_command(source.values, joint)
-    if limited is None:
-        return question, fitted
-    noise = input_noise(source.values, aligned.fs, band=question.band(0))
-    if noise is not None and noise.attenuation > WORTH:
-        return question, fitted  # a speed limit smooths the noise of a measured command
-    followed = replace(aligned, inputs=(replace(source, values=limited.values),))
-    slower = replace(question, aligned=followed, limited=limited)
-    seen_then, again = fit(slower, seen)
-    (other,) = again.fits
-    if seen_then is not seen:
-        return question, fitted  # levels were found: costs on different samples do not compare
-    if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
-        return question, fitted
-    return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
-
-
-def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
-    """Add a row for backlash, a dead zone, friction, a spring or a bent scale if it leaves noise.
-
-    Not for clipped or held outputs, and not together with a changing gain.
-    """
-    joint, source = fitted.fits[0], question.aligned.inputs[0]
-    if question.exact or fitted.gaining or is_explained(joint):
-        return fitted
-    if seen.saturation is not None or seen.hold is not None:
-        return fitted
-    attempts = [(fitted, joint.problem.y, joint.problem.nuisance)]
-    if fitted.drifting is not None and fitted.humming is None:  # the drift may have imitated it
-        attempts.append((replace(fitted, drifting=None), question.output.values, None))
-    lead, most = fitted, 2 * CLEARLY
-    for other, y, rows in attempts:
-        steady = replace(question, output=replace(question.output, values=y))
-        course = completed(turn_ahead(started(steady, seen, rows)))
-        problem = course.problem
-        known = joint.problem.fixed().shape[0] - problem.fixed().shape[0]
-        command = Command(u=source.values, intersample=course.natural)
-        for kind in kinds_in_question(command, problem, course.best, joint.best.fit):
-            for one in settled_rows(kind, command, problem, course.best):
-                beside = _with_row(steady, seen, problem, one)
-                gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
-                if beside.related and leaves_noise(beside, one) and gain > most:
-                    kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
-                    bending = described(beside, one)
-                    lead, most = replace(other, fits=(kept,), bending=bending), gain
-    return lead
-
-
-def _with_row(
-    question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
-) -> JointFit:
-    """Fit every structure with a row for a nonlinearity."""
-    valid = question.output.valid if one.counts is None else question.output.valid & one.counts
-    question = replace(question, output=replace(question.output, valid=valid))
-    course = turn_ahead(started(question, seen, with_row(problem, one).nuisance))
-    return chosen_of(completed(course), question.structures)
 
 
 def through_reference(question: Question, fitted: OutputFit) -> OutputFit:

@@ -113,7 +113,7 @@ def test_every_check_may_raise_and_the_result_stands(field_record, monkeypatch, 
 
     room = "hmpim.identify.judgement"
     for place, name in (
-        ("hmpim.identify.pair", "inspect_nonlinearity"),
+        ("hmpim.identify.nonlinearities", "inspect_nonlinearity"),
         ("hmpim.identify.pair", "response_bandwidths"),
         ("hmpim.identify.pair", "misfit"),
         (f"{room}.residual", "compare_halves"),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -29,6 +30,7 @@ from hmpim.identify.nonlinear.rows import (
     first_rows,
     with_row,
 )
+from hmpim.identify.result import Estimate
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import MATERIAL, PART
 from hmpim.record import Finding
@@ -75,6 +77,12 @@ class Modelled:
     trend: Real
     waits: Mask | None
 
+    def estimate(self, units: tuple[str, str]) -> Estimate:
+        """The size with its interval; the units are the input's and the output's."""
+        unit = units[_UNIT[self.kind]] if self.kind in _UNIT else ""
+        low, high = self.size - HALF * self.std, self.size + HALF * self.std
+        return Estimate(value=self.size, std=self.std, ci95=(low, high), unit=unit)
+
     def as_measured(self, joint: JointFit) -> tuple[Problem, Fit]:
         """The output with the nonlinearity, and the linear part, which leaves it over."""
         problem, fit = joint.problem, joint.best.fit
@@ -84,6 +92,10 @@ class Modelled:
         residual = y - fit.prediction if valid is None else np.where(valid, y - fit.prediction, 0.0)
         whole = replace(fit, residual=residual, cost=float(residual @ residual))
         return replace(problem, y=y, valid=valid), whole
+
+
+_UNIT: dict[Kind, int] = {"dead_zone": 0, "backlash": 1, "friction": 1}
+"""Whose unit a size has: the input's or the output's; others are shares."""
 
 
 def is_explained(joint: JointFit) -> bool:
@@ -202,14 +214,16 @@ def described(joint: JointFit, one: Nonlinearity) -> Modelled:
     left = weighed.innovations(fit.prediction, fit.residual)
     freedom = max(weighed.counted - others.shape[0] - 1, 1)
     variance = covariance(slope, left, freedom=freedom, white=is_white(left))
-    size, kind = float(fit.nuisance[-1]), one.kind
+    size, kind, row = float(fit.nuisance[-1]), one.kind, one.row
     if kind in ("hardening", "softening"):
         kind = "hardening" if size > 0.0 else "softening"
+    if kind == "softening":
+        size, row = -size, -row
     std = float(np.sqrt(variance[0, 0]))
     waits = None if one.counts is None else ~one.counts
     if waits is not None:
         waits[: max(one.begins, joint.forgotten)] = False
-    return Modelled(kind=kind, size=size, std=std, trend=size * one.row, waits=waits)
+    return Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits)
 
 
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
@@ -220,7 +234,7 @@ def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
         "friction": "it equals the restoring force at a deflection of",
     }
     if one.kind in words:
-        unit = units[one.kind != "dead_zone"]
+        unit = units[_UNIT[one.kind]]
         size = f"{words[one.kind]} {plus_minus(one.size, one.std)} {unit}".rstrip()
     else:
         share = plus_minus(100.0 * abs(one.size), 100.0 * one.std)

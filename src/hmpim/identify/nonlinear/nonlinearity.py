@@ -51,13 +51,15 @@ def inspect_nonlinearity(
     others: Sequence[Real] = (),
     floor: float = 0.0,
     unit: str = "",
+    modelled: bool = False,
 ) -> Inspection:
     """Look for nonlinearity in the residual of a linear fit.
 
     The input has shape (n,), `fs` is in Hz. If there is a nonlinearity, `fit` is compared with one
     of a plainer structure: a rich structure may only imitate it. If other inputs, (n,), drove the
     output at the same time, only harmonics are tested. Effects up to `floor` are ignored, the
-    r.m.s. error of rounding in the output's unit.
+    r.m.s. error of rounding in the output's unit. If the nonlinearity is `modelled`, `fit` is the
+    linear part of that model, and its residual includes the nonlinear part.
 
     Examples
     --------
@@ -85,8 +87,10 @@ def inspect_nonlinearity(
     shares = _shares(outcome, outcome.fit.cost / max(problem.counted, 1))
     findings: list[Finding] = []
     if matters:
-        findings.append(_general(outcome, output, shares, compared=not others))
-        if len(named) == 1 and (of_kind := _particular(named[0], unit)) is not None:
+        general = _general(outcome, output, shares, compared=not others, modelled=modelled)
+        findings.append(general)
+        of_kind = _particular(named[0], unit) if len(named) == 1 and not modelled else None
+        if of_kind is not None:
             findings.append(of_kind)
     return Inspection(
         seen=outcome,
@@ -129,7 +133,7 @@ def _where(outcome: Outcome, output: float) -> list[str]:
 
 
 def _general(
-    outcome: Outcome, output: float, shares: dict[str, float], *, compared: bool
+    outcome: Outcome, output: float, shares: dict[str, float], *, compared: bool, modelled: bool
 ) -> Finding:
     """Report a nonlinearity, its size, parity and kind; `compared` if kinds were compared."""
     noise, linear, nonlinear = (100 * share for share in shares.values())
@@ -147,6 +151,10 @@ def _general(
         guess += f" Its whole effect, most of which a linear model absorbs, is {percent(effect)} %."
     where = _where(outcome, output)
     at = f": {' and '.join(where)}" if where else ""
+    found = f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess}"
+    if modelled:
+        message = f"{found} The model includes it."
+        return Finding(code="nonlinear", message=message, severity="info", parameters=())
     split = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
     if outcome.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
         split += " or dynamics left out"
@@ -154,7 +162,7 @@ def _general(
         split += f"; {linear:.0f} % still follows the input"
     return Finding(
         code="nonlinear",
-        message=f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess} {split}. "
+        message=f"{found} {split}. "
         "Identify at several amplitudes to see where the linear model holds.",
         severity="doubt" if outcome.effect > MATERIAL * output else "info",
         parameters=MODELLED,

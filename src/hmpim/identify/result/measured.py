@@ -103,11 +103,12 @@ class Nonlinearity(Plain):
         input: dynamics left out, and what of a nonlinearity looks linear.
     kinds : tuple of str
         What the record leaves in question: one if it tells ('hardening', 'softening',
-        'friction', 'backlash', 'rate_limit', 'saturation', 'asymmetry', 'curvature'), several
+        'friction', 'backlash', 'rate_limit', 'saturation', 'asymmetry', 'curvature',
+        'dead_zone'), several
         if not, none if it is like none of them or too small to ask.
     size : Estimate or None
-        Of the kind, if there is one: half width of the band of friction or backlash, speed,
-        level, or share by which the largest deflection departs from proportion.
+        Of the kind, if there is one: half width of the band of friction, backlash or a dead zone,
+        speed, level, or share by which the largest deflection departs from proportion.
     harmonics : tuple of HarmonicCurve
         Of a sweep in which there is something to see; order 1 is the output itself.
     """
