@@ -15,7 +15,7 @@ from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.least_squares import without
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
@@ -205,25 +205,70 @@ def leaves_noise(joint: JointFit, one: Nonlinearity) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(joint: JointFit, one: Nonlinearity) -> Modelled:
-    """The nonlinearity as the fit with its row, the last of its rows, has it."""
+def described(joint: JointFit, one: Nonlinearity) -> tuple[Modelled, Real]:
+    """The nonlinearity as the fit with its row, the last of its rows, has it.
+
+    The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
+    its derivatives are instruments, and those of the model include how the row moves (Söderström
+    and Stoica, System Identification, 1989, ch. 8).
+    """
     weighed, fit = joint.weighed, joint.best.fit
-    rows = weighed.fixed()[1:]
-    others = jacobian(replace(weighed, nuisance=rows[:-1]), fit)
-    slope = without(weighed.masked(rows[-1:]), others)
-    left = weighed.innovations(fit.prediction, fit.residual)
-    freedom = max(weighed.counted - others.shape[0] - 1, 1)
-    variance = covariance(slope, left, freedom=freedom, white=is_white(left))
+    known = weighed.fixed()[1:-1]
+    others = replace(weighed, nuisance=known if len(known) else None)
+    tools = jacobian(others, fit, one.row)
+    residual = weighed.innovations(fit.prediction, fit.residual)
+    freedom = max(weighed.counted - len(tools), 1)
+    own = covariance(tools, residual, freedom=freedom, white=is_white(residual))
+    scale = np.sqrt(own.diagonal())
+    moved = jacobian(others, fit, *_moved_rows(joint, one, scale))[-len(tools) :]
+    mixed = tools @ (tools + moved).T * np.outer(scale, scale)
+    turn = np.linalg.lstsq(mixed, tools @ tools.T * np.outer(scale, scale), rcond=1e-12)[0]
+    own = turn @ (own / np.outer(scale, scale)) @ turn.T * np.outer(scale, scale)
     size, kind, row = float(fit.nuisance[-1]), one.kind, one.row
     if kind in ("hardening", "softening"):
         kind = "hardening" if size > 0.0 else "softening"
     if kind == "softening":
         size, row = -size, -row
-    std = float(np.sqrt(variance[0, 0]))
     waits = None if one.counts is None else ~one.counts
     if waits is not None:
         waits[: max(one.begins, joint.forgotten)] = False
-    return Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits)
+    std = float(np.sqrt(own[-1, -1]))
+    found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits)
+    return found, np.asarray(own[:-1, :-1])
+
+
+def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
+    """Derivatives of the nonlinear effect by theta, `fit.linear` and its size, (p + 1, n).
+
+    Differences over a standard deviation, `scale`, to either side, since samples begin and cease to
+    wait.
+    """
+    problem, fit = joint.problem, joint.best.fit
+    vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
+    out = np.zeros((vector.size, problem.y.size))
+    again = one.again
+    if again is None or (one.kind == "friction" and fit.structure.name != "second_order"):
+        return out
+
+    def effect(at: Real) -> Real:
+        theta, linear = at[: fit.theta.size], at[fit.theta.size : -1]
+        part = part_of(problem, fit.structure, theta)
+        nuisance = np.append(fit.nuisance[:-1], at[-1])
+        x = part.driven(linear[:-1]) + linear[-1] + fit.initial @ part.free
+        moved = replace(
+            fit,
+            theta=theta,
+            linear=linear,
+            nuisance=nuisance,
+            prediction=x + nuisance @ problem.fixed()[1:],
+        )
+        return np.asarray(fit.nuisance[-1] * again(problem, moved).row)
+
+    for i, step in enumerate(scale):
+        aside = np.zeros(vector.size)
+        aside[i] = step
+        out[i] = (effect(vector + aside) - effect(vector - aside)) / (2.0 * step)
+    return out
 
 
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:

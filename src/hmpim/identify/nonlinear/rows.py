@@ -142,7 +142,11 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | 
 def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     """A dead zone of half a width, of an input on the finer clock."""
     row = -_through_model(sampled(np.clip(fine, -half, half)) / half, problem, fit)
-    return Nonlinearity(kind="dead_zone", row=row, size=half)
+
+    def again(_: Problem, fit: Fit) -> Nonlinearity:
+        return _dead(fine, problem, fit, abs(float(fit.nuisance[-1])))
+
+    return Nonlinearity(kind="dead_zone", row=row, again=again, size=half)
 
 
 def _through_model(u: Real, problem: Problem, fit: Fit) -> Real:
