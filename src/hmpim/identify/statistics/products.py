@@ -1,9 +1,9 @@
-"""Products of what filters make of an input, over the samples that count, from statistics alone.
+"""Products of filtered inputs over the samples that count, from statistics alone.
 
 With F the impulse responses, whitened or not, and R the Toeplitz matrix of the input's
-autocorrelation, F R Fᵀ are the products of the full convolutions. Those samples of them that do not
-count lie at the two ends of each run, where the input itself is kept: they are made and taken off.
-The bias is solved for each run, or for all, and taken off too.
+autocorrelation, F R Fᵀ are the products of the full convolutions. The samples that do not count lie
+at the two ends of each run, where the input itself is kept: they are computed and subtracted. The
+bias is solved for each run, or for all, and subtracted too.
 """
 
 from dataclasses import dataclass
@@ -22,21 +22,21 @@ from hmpim.identify.statistics.statistics import Statistics
 __all__ = ["Moments", "Products", "Remainder", "Responses", "spectrum_of"]
 
 _FEW = 64
-"""Samples at the beginning up to which a convolution is sooner a product with a matrix."""
+"""Samples at the beginning up to which a convolution is faster as a product with a matrix."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
-    """Impulse responses that come to rest, at 0 or, of an integrator, at a value that they keep.
+    """Impulse responses that end at 0 or, for an integrator, at another final value.
 
     Parameters
     ----------
     rows : ndarray, shape (q, taps)
-        From `AHEAD` samples before the input on, from it on less what they keep.
+        From `AHEAD` samples before the input; from the input on, less the final value.
     steady : ndarray, shape (q,)
-        What `rows` make of a constant input of 1.
+        Response of `rows` to a constant input of 1.
     kept : ndarray, shape (q,)
-        What they keep, which multiplies the running sum of the input.
+        The final values, which multiply the running sum of the input.
     """
 
     rows: Real
@@ -45,14 +45,14 @@ class Responses:
 
     @classmethod
     def integrating(cls, rows: Real) -> "Responses":
-        """Those of an integrator, the last sample of which they keep."""
+        """Responses of an integrator, with the last sample as the final value."""
         kept, rows = rows[:, -1].copy(), rows.copy()
         rows[:, AHEAD:] -= kept[:, None]
         return cls(rows=rows, steady=rows.sum(axis=1), kept=kept)
 
     @classmethod
     def ending(cls, rows: Real, steady: Real) -> "Responses":
-        """Those that end at 0."""
+        """Responses that end at 0."""
         return cls(rows=rows, steady=steady, kept=np.zeros(steady.size))
 
     def and_also(self, others: "Responses") -> "Responses":
@@ -66,7 +66,7 @@ class Responses:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Moments:
-    """Products of rows and output, the bias solved and taken off.
+    """Products of rows and output, with the bias solved and subtracted.
 
     Parameters
     ----------
@@ -77,12 +77,12 @@ class Moments:
     energy : float
         Of the output.
     fixed, fixed_rows : ndarray, shape (runs, rows of the bias) and (…, q)
-        What multiplies the rows of each run's bias is `fixed` less `fixed_rows` times what
-        multiplies the rows.
+        The coefficients of each run's bias are ``fixed - fixed_rows @ weights``, with `weights` the
+        coefficients of the rows.
     bias : float
-        Mean bias of all runs, without what the rows bring to it.
+        Mean bias of all runs, if the weights are 0.
     bias_rows : ndarray, shape (q,)
-        What each row takes from it.
+        What each row subtracts from it per unit of its weight.
     bias_variance : float
         Of `bias`, for noise of variance 1.
     """
@@ -98,14 +98,14 @@ class Moments:
 
 
 class Remainder(NamedTuple):
-    """What a model leaves over, not whitened.
+    """The residual of a model, not whitened.
 
     Parameters
     ----------
     gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
-        Sums of products of a sample and those 1 … LONGEST before, of samples that count.
+        Sums of products of a sample that counts and the 1 … LONGEST samples before.
     counted : int
-        Of how many.
+        How many samples count.
     heads : ndarray, shape (runs, m)
         The first samples of each run, as if it had begun at rest.
     tails : ndarray, shape (runs, LONGEST)
@@ -126,13 +126,13 @@ class Products:
     statistics : Statistics
         What was read.
     skipped : int
-        First outputs of each run that do not count, since they answer what came before it, at most
+        First outputs of each run that do not count, since they depend on earlier input, at most
         `lags`; 0 where each run begins at rest.
     noise : ndarray, shape (order + 1,)
         Autoregression of the noise, 1 first.
     to_the_end : bool
         Whether the last `AHEAD` outputs of each run count. A band-limited input is continued there,
-        odd about its last sample; one that ends in motion rings about it.
+        odd about its last sample; an input that ends in motion rings there.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class Products:
         reach = statistics.reach
         self.order = self.noise.size - 1
         self.first = self.order + skipped
-        """Sample of a run from which on its whitened outputs count."""
+        """First sample of a run whose whitened output counts."""
         self._levels = np.array([run.level for run in statistics.runs])
         self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
         runs = statistics.runs
@@ -183,7 +183,7 @@ class Products:
 
     @property
     def plain(self) -> "Products":
-        """The same, the noise taken for white."""
+        """The same with white noise."""
         return self if self._plain is None else self._plain
 
     def whitened(self, noise: Real) -> "Products":
@@ -216,7 +216,7 @@ class Products:
 
     @cached_property
     def energy(self) -> float:
-        """Sum of squares of the outputs that count, the bias taken off."""
+        """Sum of squares of the outputs that count, without the bias."""
         nothing = np.zeros((len(self._runs), 0, self._others.size))
         return self._without_bias(np.zeros((0, 0)), nothing, np.zeros(0)).energy
 
@@ -224,27 +224,27 @@ class Products:
         """Products of whitened outputs and the whitened input at each tap, (rows + 2, taps)."""
         reach, order = self.statistics.reach, self.order
         once = np.zeros((run.vu.shape[0], reach.taps + order))
+        out = np.zeros((run.vu.shape[0], reach.taps))
         # Σ aᵢ Σ v(t-i) u(t-j), j from -AHEAD to lags + order
         for i, a in enumerate(self.noise):
             start = reach.forth - AHEAD - i
             once += a * run.vu[:, start : start + once.shape[1]]
-        out = np.zeros((run.vu.shape[0], reach.taps))
         for i, a in enumerate(self.noise):
             out += a * once[:, i : i + reach.taps]
         return out
 
     def _outputs(self, run: Run) -> Real:
-        """Products of whitened outputs, of the whole run, (rows + 2)²."""
+        """Products of whitened outputs over the whole run, (rows + 2)²."""
         weight = np.correlate(self.noise, self.noise, "full")[self.order :]
         later = run.vv[:, :, 1 : weight.size] @ weight[1:]
         return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
 
     def _ends_of(self, run: Run, read: Run) -> list[tuple[Real, Real]]:
-        """Input at either end of a run, and whitened outputs there, 0 beyond what was `read`."""
+        """Input at either end of a run, and whitened outputs there, 0 beyond the run as `read`."""
         reach, beyond = self.statistics.reach, run.samples - read.samples
         n, span, count = run.samples, reach.span, reach.rows + 2
-        # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
-        # the tail n - span - AHEAD + c.
+        # Sample c of a convolution with the head is sample c - AHEAD of the run; with the tail it
+        # is sample n - span - AHEAD + c.
         head, tail = (np.zeros((count, self._length)) for _ in range(2))
         size = min(reach.back, n)
         begins = np.cumsum(run.head_u[:size] + run.level[0])
@@ -267,18 +267,13 @@ class Products:
         return out
 
     def transform(self, rows: Real) -> Complex:
-        """Transforms of impulse responses, (q, taps), whitened: those that `moments` asks for."""
+        """Transforms of impulse responses, (q, taps), whitened, as `moments` takes them."""
         return np.asarray(scipy.fft.rfft(rows, self._length) * self._white)
 
     def moments(self, responses: Responses, *, known: Complex | None = None) -> Moments:
-        """Products of what impulse responses make of the input.
+        """Products of the input, filtered by impulse responses, and the output.
 
-        Parameters
-        ----------
-        responses : Responses
-            The impulse responses.
-        known : complex ndarray, optional
-            Transforms of the first rows, from `transform`.
+        `known` are the transforms of the first rows, from `transform`.
         """
         rows, kept = responses.rows, responses.kept
         if known is None:
@@ -300,16 +295,16 @@ class Products:
     def across(
         self, responses: Responses, other: "Products", others: Responses, lags: Real
     ) -> Real:
-        """Products with what other responses make of another input of the same runs.
+        """Products of this input, filtered, and another input of the same runs, filtered.
 
-        Each run has a bias of its own, and no response keeps a value.
+        Each run has its own bias, and all responses end at 0.
 
         Parameters
         ----------
         responses, others : Responses
             To this input, and to the other one.
         other : Products
-            Of the other input, the same outputs and noise.
+            Of the other input, with the same outputs and noise.
         lags : ndarray, shape (2 span + 1,)
             Σ x(t) z(t-k), k from -span on, x this input and z the other.
         """
@@ -321,9 +316,9 @@ class Products:
         apart = self._not_counted(responses.rows, ours)
         beyond = other._not_counted(others.rows, theirs)
         flat = apart.reshape(len(ours), -1) @ beyond.reshape(len(theirs), -1).T
-        told, beside = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
+        first, second = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
         inner = self._unsummed[:, :-1, :-1]
-        return np.asarray(whole - flat - np.sum(told.transpose(0, 2, 1) @ inner @ beside, axis=0))
+        return np.asarray(whole - flat - np.sum(first.transpose(0, 2, 1) @ inner @ second, axis=0))
 
     def _not_counted(self, rows: Real, spectra: Complex) -> Real:
         """Samples at the ends of each run that do not count, (q, runs, samples)."""
@@ -340,16 +335,16 @@ class Products:
         return np.concatenate([early, late], axis=2)
 
     def left_over(self, response: Real, kept: float, bias: Real) -> Remainder:
-        """Return what a model leaves over; of products without a noise model only.
+        """Return the residual of a model; for products without a noise model only.
 
         Parameters
         ----------
         response : ndarray, shape (taps,)
-            Impulse response, less what it keeps.
+            Impulse response, less its final value.
         kept : float
-            What it keeps.
+            The final value.
         bias : ndarray, shape (runs, rows)
-            What multiplies the rows of each run's bias.
+            Coefficients of the rows of each run's bias.
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])
@@ -377,46 +372,46 @@ class Products:
         return Remainder(gram, count, ends[0::2, AHEAD:], ends[1::2, last - LONGEST : last])
 
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
-        """Solve the biases and take them off."""
+        """Solve the biases and subtract them."""
         statistics = self.statistics
         inner, outer = self._unsummed[:, :-1, :-1], self._unsummed[:, :-1, -1]
         energy = float(self._unsummed[:, -1, -1].sum())
-        beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
+        with_bias, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
         if statistics.bias == "common":
             u, y = self._levels.T
-            weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], beside[:, :, 0]
+            weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], with_bias[:, :, 0]
             first = np.outer(steady, u @ with_rows)
             gram = gram + first + first.T + u**2 @ weight * np.outer(steady, steady)
             cross = cross + steady * (u @ with_y) + y @ with_rows + steady * (u * y @ weight)
             energy += float(2 * y @ with_y + y**2 @ weight)
-            beside = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
+            with_bias = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
             outer = (with_y + y * weight).sum()[None, None]
             inner = weight.sum()[None, None, None]
         if inner.shape[1] == 1:
             solved = np.divide(1.0, inner, out=np.zeros_like(inner), where=inner > 0.0)
         else:
             solved = np.linalg.pinv(inner, hermitian=True)
-        beside = beside.transpose(0, 2, 1)  # (runs, rows of the bias, q)
-        told = solved @ beside
+        with_bias = with_bias.transpose(0, 2, 1)  # (runs, rows of the bias, q)
+        fixed_rows = solved @ with_bias
         fixed = (solved @ outer[:, :, None])[:, :, 0]
         average, levels = self._average[:, None], self._levels
-        bias = (average @ fixed[:, :, None])[:, 0, 0]
-        taken = (average @ told)[:, 0]
-        if statistics.bias == "common":
-            each = fixed[0] - levels[:, 1:]
-            each_rows = (told[0] - levels[:, :1] * steady)[:, None]
-        else:
-            each, each_rows = fixed, told
-            bias, taken = bias + levels[:, 1], taken + levels[:, :1] * steady
+        bias, bias_rows = (average @ fixed[:, :, None])[:, 0, 0], (average @ fixed_rows)[:, 0]
         count, left = bias.size, energy - float((fixed * outer).sum())
+        gram = gram - (fixed_rows.transpose(0, 2, 1) @ with_bias).sum(axis=0)
+        cross = cross - (fixed[:, None] @ with_bias)[:, 0].sum(axis=0)
+        if statistics.bias == "common":
+            fixed = fixed[0] - levels[:, 1:]
+            fixed_rows = (fixed_rows[0] - levels[:, :1] * steady)[:, None]
+        else:
+            bias, bias_rows = bias + levels[:, 1], bias_rows + levels[:, :1] * steady
         return Moments(
-            gram=gram - (told.transpose(0, 2, 1) @ beside).sum(axis=0),
-            cross=cross - (fixed[:, None] @ beside)[:, 0].sum(axis=0),
-            energy=max(left, np.finfo(float).eps * abs(energy)),  # of sums that cancel
-            fixed=each,
-            fixed_rows=each_rows,
+            gram=gram,
+            cross=cross,
+            energy=max(left, np.finfo(float).eps * abs(energy)),  # sums may cancel
+            fixed=fixed,
+            fixed_rows=fixed_rows,
             bias=float(bias.sum()) / count,
-            bias_rows=taken.sum(axis=0) / count,
+            bias_rows=bias_rows.sum(axis=0) / count,
             bias_variance=float((average @ solved @ average.transpose(0, 2, 1)).sum()) / count**2,
         )
 
@@ -431,7 +426,7 @@ class Products:
 
 
 def spectrum_of(autocorrelation: Real, length: int) -> Real:
-    """Eigenvalues of the circulant of so many samples that holds a Toeplitz matrix."""
+    """Eigenvalues of the circulant matrix of some length that contains a Toeplitz matrix."""
     around = np.zeros(length)
     around[: autocorrelation.size] = autocorrelation
     around[length - autocorrelation.size + 1 :] += autocorrelation[:0:-1]
@@ -453,11 +448,11 @@ def _products(
 
 
 def _moved(head: Real) -> Real:
-    """Matrix that turns an impulse response's first samples into those of its convolution."""
+    """Matrix that turns the first samples of an impulse response into those of its convolution."""
     return np.asarray(scipy.linalg.toeplitz(head, np.zeros(head.size)).T)
 
 
 def _shifted(x: Real) -> Real:
-    """A signal and what came 1 … LONGEST samples before, 0 before it begins."""
+    """A signal delayed by 0 … LONGEST samples, 0 before it begins."""
     padded = np.concatenate([np.zeros(LONGEST), x])
     return np.stack([padded[LONGEST - k : padded.size - k] for k in range(LONGEST + 1)])
