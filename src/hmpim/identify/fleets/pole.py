@@ -1,7 +1,7 @@
-"""One more pole or zero for one record of a fleet: the few that ask for it, most of them by chance.
+"""One more pole or zero for single records of a fleet, most of which need it by chance.
 
-The record itself is fitted here, from where the fit of all ended, grown as
-`hmpim.identify.fitting.joint` grows a fit, and its intervals are widened as those of any record.
+The record itself is fitted, starting from the common fit, with poles added as in
+`hmpim.identify.fitting.joint`, and its intervals are widened as for any record.
 """
 
 from dataclasses import replace
@@ -26,10 +26,10 @@ def with_tails(
 ) -> tuple[Parameters, float | None] | None:
     """Fit one more pole to a record, (n,); None if the likelihood pays for it.
 
-    `place`, (3,), is where the record lies on the member's surface, and `own` what the fit without
-    the pole says. Returned are parameters with intervals that cover one more pole or zero where the
-    record asks for it by more than chance; and the delay, in s, with a pole that is as likely but
-    for its price.
+    `place`, (3,), is the record's point on the member's surface, and `own` are the parameters
+    without the pole. Returned are parameters with intervals that cover one more pole or zero where
+    the record supports it by more than chance; and the delay, in s, with a pole that is as likely
+    but for its price.
     """
     problem, best = alone_of(fleet, member, place, y)
 
@@ -52,8 +52,8 @@ def with_tails(
 
 
 def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Trial]:
-    """Return one record's own data and fit, from where the fit of all together ended."""
-    longest = longest_lag(y.size) + 2.0  # as of every record
+    """Return one record's own data and fit, starting from the common fit."""
+    longest = longest_lag(y.size) + 2.0  # as for every record
     problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
     fit = fit_structure(problem, fleet.structure, theta_at(place))
     return problem, trial_of(member.intersample, fit, y.size)

@@ -57,18 +57,10 @@ _ALL = Seen(valid=None, begins=None)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CompressedData(Data):
-    """What every trial of a compressed record shares.
+    """What every trial of a compressed record shares."""
 
-    Parameters
-    ----------
-    products : Products
-        Without a noise model.
-    excited : (float, float)
-        Excited band, in cycles per sample.
-    """
-
-    products: Products
-    excited: tuple[float, float]
+    products: Products  # without a noise model
+    excited: tuple[float, float]  # band in cycles per sample
 
     @classmethod
     def of(cls, statistics: Statistics, *, skipped: int) -> "CompressedData":

@@ -189,52 +189,25 @@ def _(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Residual:
-    """The residual of a fit, not whitened.
+    """The residual of a fit, not whitened."""
 
-    Parameters
-    ----------
-    power : float
-        Mean square.
-    counted : int
-        Samples that `power` is the mean of.
-    innovation : float
-        Mean square of the error with which its past predicts it.
-    share : float
-        Independent samples per sample.
-    noise : ndarray, shape (order + 1,)
-        Autoregression, 1 first; 1 alone where it is white.
-    """
-
-    power: float
-    counted: int
-    innovation: float
-    share: float
-    noise: Real
+    power: float  # mean square
+    counted: int  # samples that `power` is the mean of
+    innovation: float  # mean square of the error with which its past predicts it
+    share: float  # independent samples per sample
+    noise: Real  # autoregression, 1 first; 1 alone where it is white
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted(Fit):
-    """A fit to products; it predicts no samples, and `cost` equals `objective`.
+    """A fit to products; it predicts no samples, and `cost` equals `objective`."""
 
-    Parameters
-    ----------
-    response : ndarray, shape (taps,)
-        Impulse response, less its final value.
-    weights : ndarray, shape (q,)
-        Factors of `responses` in it: the last step, 0 if its end was evaluated; the numerator.
-    responses : Responses
-        Derivatives of the impulse response by theta, then by the numerator.
-    moments : Moments
-        Products of `responses`.
-    problem : Compressed
-        The data.
-    """
-
-    response: Real
+    response: Real  # (taps,): impulse response, less its final value
+    # (q,): factors of `responses` in it: the last step, 0 if its end was evaluated; the numerator
     weights: Real
-    responses: Responses
-    moments: Moments
-    problem: Compressed
+    responses: Responses  # derivatives of the impulse response by theta, then by the numerator
+    moments: Moments  # products of `responses`
+    problem: Compressed  # the data
 
     @property
     def products(self) -> Products:

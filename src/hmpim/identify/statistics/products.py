@@ -27,21 +27,11 @@ _FEW = 64
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
-    """Impulse responses that end at 0 or, for an integrator, at another final value.
+    """Impulse responses that end at 0 or, for an integrator, at another final value."""
 
-    Parameters
-    ----------
-    rows : ndarray, shape (q, taps)
-        From `AHEAD` samples before the input; from the input on, less the final value.
-    steady : ndarray, shape (q,)
-        Response of `rows` to a constant input of 1.
-    kept : ndarray, shape (q,)
-        The final values, which multiply the running sum of the input.
-    """
-
-    rows: Real
-    steady: Real
-    kept: Real
+    rows: Real  # (q, taps): from `AHEAD` samples before the input; later, less the final value
+    steady: Real  # (q,): response of `rows` to a constant input of 1
+    kept: Real  # (q,): the final values, which multiply the running sum of the input
 
     @classmethod
     def integrating(cls, rows: Real) -> "Responses":
@@ -68,54 +58,27 @@ class Responses:
 class Moments:
     """Products of rows and output, with the bias solved and subtracted.
 
-    Parameters
-    ----------
-    gram : ndarray, shape (q, q)
-        Of the rows.
-    cross : ndarray, shape (q,)
-        Of rows and output.
-    energy : float
-        Of the output.
-    fixed, fixed_rows : ndarray, shape (runs, rows of the bias) and (…, q)
-        The coefficients of each run's bias are ``fixed - fixed_rows @ weights``, with `weights` the
-        coefficients of the rows.
-    bias : float
-        Mean bias of all runs, if the weights are 0.
-    bias_rows : ndarray, shape (q,)
-        What each row subtracts from it per unit of its weight.
-    bias_variance : float
-        Of `bias`, for noise of variance 1.
+    With `weights` the coefficients of the rows, the coefficients of each run's bias are
+    ``fixed - fixed_rows @ weights``, and the mean bias is ``bias - bias_rows @ weights``.
     """
 
-    gram: Real
-    cross: Real
-    energy: float
-    fixed: Real
-    fixed_rows: Real
+    gram: Real  # (q, q): of the rows
+    cross: Real  # (q,): of rows and output
+    energy: float  # of the output
+    fixed: Real  # (runs, rows of the bias)
+    fixed_rows: Real  # (runs, rows of the bias, q)
     bias: float
-    bias_rows: Real
-    bias_variance: float
+    bias_rows: Real  # (q,)
+    bias_variance: float  # of `bias`, for noise of variance 1
 
 
 class Remainder(NamedTuple):
-    """The residual of a model, not whitened.
+    """The residual of a model, not whitened."""
 
-    Parameters
-    ----------
-    gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
-        Sums of products of a sample that counts and the 1 … LONGEST samples before.
-    counted : int
-        How many samples count.
-    heads : ndarray, shape (runs, m)
-        The first samples of each run, as if it had begun at rest.
-    tails : ndarray, shape (runs, LONGEST)
-        Its last samples.
-    """
-
-    gram: Real
-    counted: int
-    heads: Real
-    tails: Real
+    gram: Real  # (LONGEST + 1)²: sums of products of a sample that counts and those before it
+    counted: int  # samples that count
+    heads: Real  # (runs, m): first samples of each run, as if it had begun at rest
+    tails: Real  # (runs, LONGEST): its last samples
 
 
 class Products:
@@ -297,16 +260,9 @@ class Products:
     ) -> Real:
         """Products of this input, filtered, and another input of the same runs, filtered.
 
-        Each run has its own bias, and all responses end at 0.
-
-        Parameters
-        ----------
-        responses, others : Responses
-            To this input, and to the other one.
-        other : Products
-            Of the other input, with the same outputs and noise.
-        lags : ndarray, shape (2 span + 1,)
-            Σ x(t) z(t-k), k from -span on, x this input and z the other.
+        Each run has its own bias, and all responses end at 0. The outputs and the noise of both are
+        the same; `lags`, (2 span + 1,), are Σ x(t) z(t-k), k from -span on, x this input and z the
+        other.
         """
         span = self.statistics.reach.span
         ours, theirs = self.transform(responses.rows), other.transform(others.rows)
@@ -337,14 +293,8 @@ class Products:
     def left_over(self, response: Real, kept: float, bias: Real) -> Remainder:
         """Return the residual of a model; for products without a noise model only.
 
-        Parameters
-        ----------
-        response : ndarray, shape (taps,)
-            Impulse response, less its final value.
-        kept : float
-            The final value.
-        bias : ndarray, shape (runs, rows)
-            Coefficients of the rows of each run's bias.
+        The model has an impulse response, (taps,), less its final value, that value `kept`, and
+        coefficients of each run's bias, (runs, rows).
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])

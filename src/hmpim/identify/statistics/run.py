@@ -143,7 +143,7 @@ def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
     return run
 
 
-def cubes(run: Run, u: Real) -> Real:
+def _cubes(run: Run, u: Real) -> Real:
     """Cubes of inputs, by the scale of a run."""
     return np.asarray((u / run.scale[0]) ** 3 if run.scale[0] else np.zeros_like(u))
 
@@ -165,8 +165,8 @@ def of_cubes(run: Run, reach: Reach, scale: float) -> Run:
         uu=run.ww * ratio**2,
         vu=np.insert(run.vw * ratio, reach.rows, 0.0, axis=0),
         vv=vv,
-        head_u=cubes(run, run.head_u) * ratio,
-        tail_u=cubes(run, run.tail_u) * ratio,
+        head_u=_cubes(run, run.head_u) * ratio,
+        tail_u=_cubes(run, run.tail_u) * ratio,
     )
 
 
@@ -251,7 +251,7 @@ def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
     whole_v = np.hstack([before, v])
     inputs, whole = u[None], whole_u[None]
     if run.cubed:
-        whole = np.vstack([whole, cubes(run, whole_u)])
+        whole = np.vstack([whole, _cubes(run, whole_u)])
         inputs = whole[:, reach.span :]
     products = _one_by_one if u.size <= _FEW else _transformed
     xx, after, ahead, vv = products(reach, (inputs, v), (whole, whole_v))
@@ -282,16 +282,10 @@ def _transformed(
 ) -> tuple[Real, Real, Real, Real]:
     """Products of new inputs and outputs with the `span` and `forth` samples before, by FFT.
 
-    Inputs are the input and, where it is kept, its cube.
-
-    Returns
-    -------
-    xx : ndarray, shape (inputs, inputs, span + 1)
-        Σ x_i(t) x_j(t-k).
-    after, ahead : ndarray, shape (inputs, rows + 2, back + 1) and (inputs, rows + 2, forth)
-        Σ v(t) x(t-k), k from 0 on; Σ x(t) v(t-k), k from 1 on.
-    vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
-        Σ v_i(t) v_j(t-k).
+    Inputs are the input and, where it is kept, its cube. Returned are xx, Σ x_i(t) x_j(t-k), shape
+    (inputs, inputs, span + 1); after, Σ v(t) x(t-k), k from 0 on, (inputs, rows + 2, back + 1);
+    ahead, Σ x(t) v(t-k), k from 1 on, (inputs, rows + 2, forth); and vv, Σ v_i(t) v_j(t-k),
+    (rows + 2, rows + 2, LONGEST + 1).
     """
     length = scipy.fft.next_fast_len(new[0].shape[1] + reach.span, real=True)
     new_x, new_v = (_late(x, reach.span, length) for x in new)

@@ -81,17 +81,9 @@ def rough_of(
 ) -> RoughResponse:
     """Estimate the response without a model, from the correlations of input and output.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        Of the runs.
-    known : ndarray, shape (taps,), optional
-        Impulse response that is already explained, and is subtracted.
-    lag : int, optional
-        Delay in samples to begin from; by default the lag of their greatest correlation.
-    differenced : bool
-        Whether the output's differences are the response to the input, so that the output itself
-        responds to the running sum.
+    An impulse response that is `known`, (taps,), is subtracted. The delay to begin from is that of
+    the greatest correlation unless `lag` gives it, in samples. If `differenced`, the output is the
+    response to the running sum of the input.
     """
     reach = statistics.reach
     uu, yu = correlations(statistics)
