@@ -31,7 +31,7 @@ def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
     key : (str, str) or str
         Output and input, or the output.
     holder : str
-        What has the pairs, for the message: 'the result'.
+        Owner of the pairs, for the message: 'the result'.
 
     Raises
     ------
