@@ -29,7 +29,7 @@ def with_tails(
     `place`, (3,), is the record's point on the member's surface, and `own` are the parameters
     without the pole. Returned are parameters with intervals that cover one more pole or zero where
     the record supports it by more than chance; and the delay, in s, with a pole that is as likely
-    but for its price.
+    except for its price.
     """
     problem, best = alone_of(fleet, member, place, y)
 

@@ -41,14 +41,14 @@ _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase9
 
 
 def are_quiet(
-    fleet: Fleet, group: Group, outputs: Real, *, behind: Real, sweep: SweepPhase | None
+    fleet: Fleet, group: Group, outputs: Real, *, simpler: Real, sweep: SweepPhase | None
 ) -> Mask:
     """Return which records of a group pass every test of `identify`, shape (k,).
 
-    Their outputs have shape (k, n); `behind`, (k, s), holds the least residual sums of squares of
+    Their outputs have shape (k, n); `simpler`, (k, s), are the least residual sums of squares of
     simpler structures; `sweep` is the stimulus' phase, if it is a sweep.
     """
-    quiet = group.sound & _is_well_known(fleet, group, behind)
+    quiet = group.sound & _is_well_known(fleet, group, simpler)
     alike = [likeness(fleet.u, output, longest_lag(fleet.u.size)) for output in outputs]
     lags = np.array([own.lag for own in alike])
     quiet &= ~stand_out(group.residual) & [own.lead is None for own in alike]
@@ -73,11 +73,11 @@ def are_quiet(
     return np.asarray(quiet)
 
 
-def _is_well_known(fleet: Fleet, group: Group, behind: Real) -> Mask:
+def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
     """Where each figure is known well enough, and every simpler structure is excluded."""
     fit, fs, n = group.fit, fleet.fs, fleet.u.size
     cost = fit.cost[group.some]
-    known = n * np.log(behind / cost[:, None]).min(axis=1) > 2 * EXCLUDED
+    known = n * np.log(simpler / cost[:, None]).min(axis=1) > 2 * EXCLUDED
     for name in _TOLD:
         if name in group.alone:
             column = group.alone[name]

@@ -46,9 +46,9 @@ class Surface:
     --------
     >>> low, high = np.array([1.0, 0.0]), np.array([2.0, 0.5])
     >>> at = places_in(low, high, 8)
-    >>> told = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
-    >>> value, slope = told.at(np.array([[1.5, 0.2]]))
-    >>> bool(abs(value[0, 0] - np.exp(0.3)) < told.error[0]), bool(told.error[0] < 1e-6)
+    >>> surface = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
+    >>> value, slope = surface.at(np.array([[1.5, 0.2]]))
+    >>> bool(abs(value[0, 0] - np.exp(0.3)) < surface.error[0]), bool(surface.error[0] < 1e-6)
     (True, True)
     """
 

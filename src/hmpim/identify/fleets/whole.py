@@ -143,8 +143,9 @@ def whole_pairs(
     bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
     columns = {name: column.copy() for name, column in fit.columns.items()}
     for group in fit.groups:
-        behind, some = simpler[group.some], group.some
-        quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
+        some = group.some
+        costs = simpler[some]
+        quiet = are_quiet(fleet, group, outputs[some], simpler=costs, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
         measured = outputs[some[places]]
         covered = _cover_bends(fleet, group, places, measured, shapes=whole.shapes, columns=columns)
@@ -180,7 +181,7 @@ def whole_pairs(
                 frequency_response=response,
                 numerator=(1.0,),
                 denominator=(*system.denominator[::-1].tolist(),),
-                candidates=_candidates(whole, fit, group, k, behind[k], float(power[i])),
+                candidates=_candidates(whole, group, k, costs[k], float(power[i])),
                 warnings=(*findings, *_findings(fleet, group, k, own)),
                 from_response=crossings,
                 nonlinearity=_NOTHING,
@@ -259,7 +260,7 @@ def _covariance(fleet: Fleet, group: Group, k: int, system: RationalDelay) -> Re
 
 
 def _candidates(
-    whole: Whole, fit: FleetFit, group: Group, k: int, behind: Real, power: float
+    whole: Whole, group: Group, k: int, costs: Real, power: float
 ) -> tuple[Candidate, ...]:
     """All structures that were tried, the likeliest first."""
     fleet, i = whole.fleet, int(group.some[k])
@@ -270,7 +271,7 @@ def _candidates(
     ]
     tried += [
         (simpler.structure, fleet.natural, float(cost), False)
-        for simpler, cost in zip(whole.simpler, behind, strict=True)
+        for simpler, cost in zip(whole.simpler, costs, strict=True)
     ]
     found = [
         Candidate(

@@ -89,7 +89,11 @@ def response_bandwidths(
     near = {name: e.value for name in _NAMES if (e := getattr(modelled, name)) is not None}
     if not near:
         return ResponseBandwidths()
-    steepness = _slopes(replace(system, delay=0.0), np.array([*near.values()]))
+    # Derivative of ln G by frequency, 1/Hz, without the delay: gain and phase.
+    f = np.array([*near.values()])
+    ends = response(replace(system, delay=0.0), np.concatenate([f - 1e-4 * f, f + 1e-4 * f]))
+    low, high = np.split(ends, 2)
+    steepness = np.asarray(np.log(high / low) / (2 * (1e-4 * f)))
     divided = _divided(measured, system, fs, intersample)
 
     def crossing(name: str, value: float, steep: complex) -> Estimate | None:
@@ -146,10 +150,3 @@ def less_bias(
         return estimate(found.value - bias, found.spread**2 + bias**2, unit="Hz")
 
     return ResponseBandwidths(**{name: corrected(name) for name in _NAMES})
-
-
-def _slopes(still: RationalDelay, f: Real) -> Complex:
-    """Derivative of ln G by frequency, 1/Hz, for a system without delay: gain and phase."""
-    step = 1e-4 * f
-    low, high = np.split(response(still, np.concatenate([f - step, f + step])), 2)
-    return np.asarray(np.log(high / low) / (2 * step))

@@ -94,7 +94,14 @@ def read_figures(
     """
     system = system_of(structure, vector, fs)
     values, peak = _values(structure, vector, system, fs=fs, highest=highest)
-    by_coefficient = _by_coefficient(structure, vector, fs)
+
+    def coefficients(at: Real) -> Real:
+        """The delay and the coefficients of B and A in s; the first of A that is not 0 is 1."""
+        other = system_of(structure, at, fs)
+        varied = other.denominator[structure.integrators + 1 :]
+        return np.concatenate([[other.delay], other.numerator, varied])
+
+    by_coefficient = gradient(coefficients, vector)  # (p, q)
     slopes = _slopes(structure, vector, fs, values)
     slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
     unit_of = units_of(structure, units)
@@ -190,20 +197,6 @@ def _slope_at_dc(system: RationalDelay) -> float:
     above = system.numerator
     lead = above[1] / above[0] if above.size > 1 and above[0] else 0.0
     return float(system.delay + (first - lead) * (system.step or 1.0))
-
-
-def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
-    """Derivatives of the delay and the coefficients of B and A in s by the vector of a fit, (p, q).
-
-    The first coefficient of A that is not zero is 1, and is left out.
-    """
-
-    def coefficients(at: Real) -> Real:
-        system = system_of(structure, at, fs)
-        varied = system.denominator[structure.integrators + 1 :]
-        return np.concatenate([[system.delay], system.numerator, varied])
-
-    return gradient(coefficients, vector)
 
 
 def _slopes_of_marks(

@@ -4,7 +4,7 @@ Held, linear and band-limited inputs are three models without a parameter betwee
 record cannot distinguish them and none is stated, the figure is that of the likeliest, and its
 interval is the hull of the intervals under each that the likelihood does not exclude (a union of
 confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994). The same holds for one more pole that
-is as likely but for its price, or that would not show.
+is as likely except for its price, or that would not show.
 """
 
 from collections.abc import Iterable

@@ -47,16 +47,13 @@ def plus_minus(value: float, std: float, *, short: bool = False) -> str:
     >>> plus_minus(0.9999999999999996, 1.1e-14)  # exact but for rounding
     '1 ± 1e-14'
     """
-    places = _places(std, short=short)
     if 0.0 < std < _ROUNDING * abs(value):
         return f"{value:.10g} ± {std:.0e}"
+    places, exponent = _digits(value, [std], short=short)
     if places is None:
         return f"{value:.6g} ± {'0' if std == 0 else '?'}"
-    exponent = _exponent(value, std, places)
-    if exponent:
-        value, std = value / 10.0**exponent, std / 10.0**exponent
-        return f"({_at(value, places + exponent)} ± {_at(std, places + exponent)})e{exponent:+03d}"
-    return f"{_at(value, places)} ± {_at(std, places)}"
+    number, error = (_at(each / 10.0**exponent, places + exponent) for each in (value, std))
+    return _with_power(f"{number} ± {error}", exponent)
 
 
 def aside(value: float, low: float | None, high: float | None) -> str:
@@ -87,8 +84,7 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     lengths = [None if length is None else length / 10.0**exponent for length in reach]
     places += exponent
     down, up = ("?" if length is None else _at(length, places) for length in lengths)
-    number = f"{_at(value / 10.0**exponent, places)} −{down} +{up}"
-    return f"({number})e{exponent:+03d}" if exponent else number
+    return _with_power(f"{_at(value / 10.0**exponent, places)} −{down} +{up}", exponent)
 
 
 def interval(low: float | None, high: float | None, *, value: float, std: float | None) -> str:
@@ -120,13 +116,12 @@ def interval(low: float | None, high: float | None, *, value: float, std: float 
     known = [abs(end - value) for end in ends if end != value] if std is None else [std]
     places, exponent = _digits(value, known)
     if places is None or max(known) < _ROUNDING * abs(value):
-        shown, power = [f"{end:.6g}" for end in ends], ""
+        shown, exponent = [f"{end:.6g}" for end in ends], 0
     else:
         shown = [_at(end / 10.0**exponent, places + exponent) for end in ends]
-        power = f"e{exponent:+03d}" if exponent else ""
     if len(shown) == 2:
-        both = " to ".join(shown)
-        return f"({both}){power}" if power else both
+        return _with_power(" to ".join(shown), exponent)
+    power = f"e{exponent:+03d}" if exponent else ""
     return f"{shown[0]}{power} or {'less' if low is None else 'more'}"
 
 
@@ -141,29 +136,29 @@ def percent(share: float) -> str:
     return f"{float(f'{100.0 * share:.2g}'):g}"
 
 
-def _places(std: float, *, short: bool = False) -> int | None:
-    """Decimal places that show two digits of `std`, or one; None if it is not positive."""
+def _digits(
+    value: float, errors: Sequence[float], *, short: bool = False
+) -> tuple[int | None, int]:
+    """Decimal places for two digits of the errors, or one, and the power of ten to factor out.
+
+    There are no places without a positive error, and no power where plain digits are readable.
+    """
+    std = max(min(errors), _ROUGHLY * max(errors)) if errors else 0.0
     if not (math.isfinite(std) and std > 0.0):
-        return None
+        return None, 0
+    places = 1 - int(f"{std:.1e}".partition("e")[2])
     digits, _, exponent = f"{std:.2e}".partition("e")
     if short and _ONE_DIGIT <= int(digits.replace(".", "")) < 950:
-        return -int(exponent)
-    return 1 - int(f"{std:.1e}".partition("e")[2])
-
-
-def _digits(value: float, errors: Sequence[float]) -> tuple[int | None, int]:
-    """Decimal places that show the errors to either side, and the power of ten to factor out."""
-    places = _places(max(min(errors), _ROUGHLY * max(errors))) if errors else None
-    return places, 0 if places is None else _exponent(value, max(errors), places)
-
-
-def _exponent(value: float, std: float, places: int) -> int:
-    """Power of ten to factor out, 0 where plain digits are readable."""
-    largest = max(abs(value), std)
+        places = -int(exponent)
+    largest = max(abs(value), *errors)
     few = places <= _MOST_PLACES or largest >= _SMALLEST_LONG
-    if few and largest < _LARGEST_PLAIN:
-        return 0
-    return math.floor(math.log10(largest)) if math.isfinite(largest) else 0
+    if (few and largest < _LARGEST_PLAIN) or not math.isfinite(largest):
+        return places, 0
+    return places, math.floor(math.log10(largest))
+
+
+def _with_power(text: str, exponent: int) -> str:
+    return f"({text})e{exponent:+03d}" if exponent else text
 
 
 def _at(value: float, places: int) -> str:

@@ -68,13 +68,13 @@ class Identification(ByValue):
             for pair in self.pairs
             for row in pair_rows(pair) or [["–", "–", "–", pair.verdict]]
         ]
-        said = dict.fromkeys(w.message for pair in self.pairs for w in pair.warnings)
+        messages = dict.fromkeys(w.message for pair in self.pairs for w in pair.warnings)
         source = f" of {self.record.source}" if self.record.source else ""
         return html_table(
             f"Identification{source}: {self.verdict}",
             ["from → to", "parameter", "value", "95 %", "verdict"],
             rows,
-            notes=list(said),
+            notes=list(messages),
         )
 
     @property

@@ -2,7 +2,7 @@
 
 An odd distortion of a sweep (friction, backlash, a dead zone, a limited speed, a cubic spring) adds
 three times its frequency to the output, and so does the cube of the input. A score test (C. R. Rao,
-Proc. Camb. Phil. Soc. 44, 1948) asks whether short responses to the cube explain the residual,
+Proc. Camb. Phil. Soc. 44, 1948) checks whether short responses to the cube explain the residual,
 after all parameters of the model and the same responses to the input itself, which a linear system
 may have. Under any linear system the gain is chi-squared. The cube of a binary input is the input
 itself, so that nothing can be tested.
@@ -34,7 +34,7 @@ _GROUPS = 5
 """Frequencies that are tested, from 0 to the highest of the cube."""
 
 _TIMES = 3.0
-"""The cube of a sinusoid has so many times its frequency, and a third of the amplitude there."""
+"""The cube of a sinusoid has a part at three times its frequency, with a third of the amplitude."""
 
 _SEEN = 1e-6
 """Share of a direction's power, below which the input's own responses explain it and it is not

@@ -43,7 +43,7 @@ _FEWEST = 50
 """Samples that must count."""
 
 _FORGOTTEN = 1e-4
-"""Of an impulse response's peak, below which it is over."""
+"""Share of an impulse response's peak below which the response has ended."""
 
 _TASTE = 5
 """Steps with an integrator from each start, before the best is followed if it is not hopeless."""

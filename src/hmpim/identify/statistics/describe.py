@@ -110,9 +110,7 @@ def identify_statistics(
     """
     _check_moves(statistics)
     data, joint = choose(
-        statistics,
-        intersample=intersample or statistics.intersample,
-        structures=structures,
+        statistics, intersample=intersample or statistics.intersample, structures=structures
     )
     if joint.related:
         _check_window(statistics, as_fitted(joint.best.fit))
@@ -308,7 +306,7 @@ def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) ->
                 variance * best.moments.bias_variance,
                 freedom=products.counted - 1,
                 unit=statistics.units[1],
-            ),
+            )
         ),
         paper=PaperEstimates(),
         frequency_response=FrequencyResponse(

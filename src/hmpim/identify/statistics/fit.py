@@ -179,9 +179,7 @@ class _Evaluation:
 
 @evaluating.register
 def _(
-    first: Compressed,
-    problems: Sequence[Problem],
-    structures: Sequence[Structure],
+    first: Compressed, problems: Sequence[Problem], structures: Sequence[Structure]
 ) -> Callable[[Sequence[Real]], _Evaluation]:
     """Evaluate by products of impulse responses."""
     return lambda thetas: _Evaluation(first, structures[0], thetas[0])
@@ -295,7 +293,7 @@ def as_fitted(fit: Fit) -> Fitted:
 
 
 def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
-    """Update a fit to more samples of the same run, with at most so many evaluations.
+    """Update a fit to more samples of the same run, with a limited number of evaluations.
 
     Where these samples move it by a fraction of its error bars, one step of Gauss and Newton is
     enough. Its end is predicted by the derivatives and not evaluated, which halves the cost.
@@ -317,7 +315,7 @@ def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
 def fit_briefly(
     problem: Compressed, structure: Structure, theta: Real, *, evaluations: int
 ) -> Fitted:
-    """Fit one structure from one start with at most so many evaluations."""
+    """Fit one structure from one start with a limited number of evaluations."""
     here = _Evaluation(problem, structure, bounded_for(problem, structure, theta))
     return _climbed(here, evaluations)
 

@@ -76,7 +76,7 @@ def misfit_of(
 def explained_by(explained: Real, cost: float, freedom: int) -> Misfit:
     """Compare the power that each of several directions explains, (k,), with the noise's.
 
-    `cost` is the sum of squares of the residual, which has so many degrees of freedom.
+    `cost` is the sum of squares of the residual, and `freedom` its degrees of freedom.
     """
     variance, power = cost / max(freedom, 1), float(np.sum(explained))
     return Misfit(

@@ -164,7 +164,7 @@ class Products:
         skipped: int | None = None,
         noise: Real | None = None,
     ) -> "Products":
-        """The same but for what is given."""
+        """The same with other statistics, another number of skipped outputs, or another noise."""
         return Products(
             self.statistics if statistics is None else statistics,
             skipped=self.skipped if skipped is None else skipped,

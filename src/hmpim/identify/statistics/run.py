@@ -176,7 +176,7 @@ def cubes_by(run: Run, reach: Reach, scale: float, *, to_the_end: bool) -> Real:
     if not to_the_end:
         return known
     pair = (run, of_cubes(run, reach, scale))
-    after = [closed(one, reach).tail_u[-AHEAD:] for one in pair]
+    after = [closed(each, reach).tail_u[-AHEAD:] for each in pair]
     whole = [np.concatenate([x.tail_u, y]) for x, y in zip(pair, after, strict=True)]
     behind = np.correlate(whole[0], after[1], "valid")[::-1]
     before = np.correlate(whole[1], after[0], "valid")[:-1]
@@ -191,11 +191,7 @@ def _scaled(run: Run, u: Real) -> Run:
     scale = 2.0 ** np.ceil(np.log2(peak))
     ratio = (run.scale[0] / scale) ** 3
     return replace(
-        run,
-        scale=np.array([scale]),
-        ww=run.ww * ratio**2,
-        wu=run.wu * ratio,
-        vw=run.vw * ratio,
+        run, scale=np.array([scale]), ww=run.ww * ratio**2, wu=run.wu * ratio, vw=run.vw * ratio
     )
 
 
