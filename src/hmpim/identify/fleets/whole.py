@@ -23,7 +23,7 @@ from hmpim.identify.fleets.fleet import (
     widen,
 )
 from hmpim.identify.fleets.learnt import is_alike, theta_at
-from hmpim.identify.fleets.pole import alone_of, joint_of
+from hmpim.identify.fleets.pole import alone_of
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
@@ -197,8 +197,9 @@ def _shapes_of(fleet: Fleet) -> Real:
     member = next(usual, fleet.members[0])
     place = (member.surface.low + member.surface.high) / 2
     values = member.surface.values(place[None])[0]
-    problem, best = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
-    return bent_shapes(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+    alone = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
+    mode, fit = member.intersample, alone.best.fit
+    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
 
 
 def _cover_bends(
@@ -226,20 +227,15 @@ def _cover_bends(
     covered = np.ones(some.size, dtype=bool)
     for k in np.flatnonzero(gains > _ASKED).tolist():
         i, j = int(some[k]), int(group.some[some[k]])
-        problem, best = alone_of(fleet, member, group.fit.theta[j], outputs[k])
-        bent = bends(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+        alone = alone_of(fleet, member, group.fit.theta[j], outputs[k])
+        mode, fit = member.intersample, alone.best.fit
+        bent = bends(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
         if not bent:
             continue
         covered[k] = not bent[0].certain and not group.has_tail(i)
         if covered[k]:
-            own = parameters_of(group.alone, i)
-            wide = spanned(
-                own,
-                joint_of(problem, best),
-                fs=fleet.fs,
-                highest=fleet.highest,
-                bent=[(one.fit, one.farthest) for one in bent],
-            )
+            own, moved = parameters_of(group.alone, i), [(each.fit, each.farthest) for each in bent]
+            wide = spanned(own, alone, fs=fleet.fs, highest=fleet.highest, bent=moved)
             widen(columns, j, own, wide)
     return covered
 
