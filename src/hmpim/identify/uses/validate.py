@@ -413,21 +413,15 @@ def _tests(
     bounds: Bounds,
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
-    checks = []
-    least = bounds.chance or FALSE_ALARM
-    worst = float(scipy.special.chdtri(1, least))
+    checks, fs, least = [], aligned.fs, bounds.chance or FALSE_ALARM
+    # At worst the model's error lies in one direction: its square is chi-squared with 1.
+    error = float(np.mean(model_std[scored] ** 2))
+    most = float(scipy.special.chdtri(1, least)) * error
     for pair, model in zip(pairs, models, strict=True):
         u = aligned.signal(pair.input).values
-        band = excited_band(u, aligned.fs)
-        left = misfit(
-            u,
-            residual,
-            delay=model.delay * aligned.fs,
-            band=(band[0] / aligned.fs, band[1] / aligned.fs),
-        )
-        power = left.share * _power_in(residual, band, aligned.fs) / np.mean(scored)
-        # At worst the model's error lies in one direction: its square is chi-squared with 1.
-        admitted = power <= worst * float(np.mean(model_std[scored] ** 2))
+        low, high = excited_band(u, fs)
+        left = misfit(u, residual, delay=model.delay * fs, band=(low / fs, high / fs))
+        admitted = left.share * _power_in(residual, (low, high), fs) / np.mean(scored) <= most
         name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
         result = (
             f"The residual does not follow {pair.input!r}"
@@ -450,20 +444,18 @@ def _tests(
         for pair in pairs
         for warning in pair.warnings
     )
-    quiet = float(np.mean(model_std[scored] ** 2)) < MATERIAL * models[0].noise_std ** 2
-    checks.append(
-        Check(
-            name="whiteness",
-            value=white,
-            low=bounds.chance if quiet and not coloured else None,
-            high=None,
-            message="The residual is "
-            + ("white" if white >= least else "coloured")
-            + (", as the noise was" if coloured and white < least else "")
-            + f" (p-value {_p_value(white, least)}).",
-        )
+    quiet = error < MATERIAL * models[0].noise_std ** 2
+    colour = "white"
+    if white < least:
+        colour = "coloured, as the noise was" if coloured else "coloured"
+    whiteness = Check(
+        name="whiteness",
+        value=white,
+        low=bounds.chance if quiet and not coloured else None,
+        high=None,
+        message=f"The residual is {colour} (p-value {_p_value(white, least)}).",
     )
-    return tuple(checks)
+    return (*checks, whiteness)
 
 
 def _p_value(value: float, least: float) -> str:
