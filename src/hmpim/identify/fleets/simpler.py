@@ -21,7 +21,7 @@ from hmpim.identify.fleets.surface import Surface, places_in
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
-from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.model.sampled import prepare_input
 
 __all__ = ["Simpler", "costs_of", "learn_simpler"]
 
@@ -66,36 +66,22 @@ def learn_simpler(
     if any(STRUCTURES[name].order > 1 or STRUCTURES[name].parameters > 5 for name in names):
         return None
     usual = [output for output, own in zip(outputs, tried, strict=True) if own == ordinary]
-    source, found = prepare_input(fleet.u, fleet.natural), []
-    for name, ends in _places(fleet, source, usual, names).items():
-        structure, own = STRUCTURES[name], np.stack(ends)
-        low, high = box_around(own, np.array(_LEAST[: own.shape[1]]))
+    source, longest = prepare_input(fleet.u, fleet.natural), longest_lag(fleet.u.size)
+    problems = [Problem(source=source, y=y, valid=None, longest_delay=longest + 2.0) for y in usual]
+    rough = rough_response(fleet.u, usual[0], longest_delay=longest)
+    first = fit_plain(problems[0], rough, (fleet.structure.name, *names))
+    starts = {fit.structure.name: fit.theta for fit in first}
+    found = []
+    for name in names:
+        structure = STRUCTURES[name]
+        own = [fit_structure(problems[0], structure, starts[name]).theta]
+        own += [fit_structure(problem, structure, own[0]).theta for problem in problems[1:]]
+        low, high = box_around(np.stack(own), np.array(_LEAST[: own[0].size]))
         places = places_in(low, high, _DEGREE)
         basis, values = in_basis(answers(source, structure, places))
         surface = Surface.fitted(low, high, places, values, degree=_DEGREE)
         found.append(Simpler(structure=structure, basis=basis, surface=surface))
     return tuple(found)
-
-
-def _places(
-    fleet: Fleet, source: SampledInput, outputs: Sequence[Real], names: tuple[StructureName, ...]
-) -> dict[StructureName, list[Real]]:
-    """Fitted parameters of each structure for each output, starting from those of the first."""
-    longest = longest_lag(fleet.u.size)
-    problems = [
-        Problem(source=source, y=y, valid=None, longest_delay=longest + 2.0) for y in outputs
-    ]
-    rough = rough_response(fleet.u, outputs[0], longest_delay=longest)
-    starts = {
-        fit.structure.name: fit.theta
-        for fit in fit_plain(problems[0], rough, (fleet.structure.name, *names))
-    }
-    found: dict[StructureName, list[Real]] = {name: [] for name in names}
-    for problem in problems:
-        for name, ends in found.items():
-            start = ends[0] if ends else starts[name]
-            ends.append(fit_structure(problem, STRUCTURES[name], start).theta)
-    return found
 
 
 def costs_of(simpler: Simpler, centred: Real, power: Real) -> Real:

@@ -91,14 +91,14 @@ class CompressedData(Data):
     def misfit(self, fit: Fit) -> Misfit:
         """How much of the residual follows the input, whatever its colour."""
         fitted = as_fitted(fit)
-        products = _whitening(fitted)
+        products = fitted.whitening
         return misfit_of(fitted, products, self.band, probes_at(fit.delay, self.band, products))
 
     def beyond(self, fit: Fit) -> Misfit | None:
         """How much of the residual follows the cube of the input; None where no cube is kept."""
         if not has_cubes(self.products.statistics):
             return None
-        return beyond_of(as_fitted(fit), _whitening(as_fitted(fit)), self.band)
+        return beyond_of(as_fitted(fit), as_fitted(fit).whitening, self.band)
 
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
         """Autoregression of the residual of a fit, 1 first; 1 alone where it is white."""
@@ -123,14 +123,6 @@ class CompressedData(Data):
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
         """The test of a fit for one more pole."""
         return hidden_pole_of(as_fitted(fit))
-
-
-def _whitening(fitted: Fitted) -> Products:
-    """Products that whiten the residual of a fit."""
-    products = fitted.products
-    if products.order or fitted.is_white:
-        return products
-    return products.whitened(fitted.left.noise)
 
 
 def choose(

@@ -213,6 +213,13 @@ class Fitted(Fit):
         return self.problem.products
 
     @property
+    def whitening(self) -> Products:
+        """Products that whiten the residual."""
+        products = self.products
+        white = products.order or self.is_white
+        return products if white else products.whitened(self.left.noise)
+
+    @property
     def is_white(self) -> bool:
         """Whether the residual passes for white."""
         return self.left.noise.size == 1

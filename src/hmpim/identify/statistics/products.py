@@ -133,9 +133,11 @@ class Products:
             slice(reach.span, reach.span + reach.taps + self.order),
         )
         """Samples of a full convolution with the head that do not count; with the tail."""
-        heads = [run.head_u[: self.first + AHEAD] for run in runs]
-        few = self._apart[0].stop <= min(_FEW, reach.taps)
-        self._begun = np.stack([_moved(head) for head in heads]) if few else None
+        self._begun: Real | None = None
+        """Matrices that turn the first samples of a response into those of a convolution."""
+        if self._apart[0].stop <= min(_FEW, reach.taps):
+            heads = [run.head_u[: self.first + AHEAD] for run in runs]
+            self._begun = np.stack([scipy.linalg.toeplitz(u, 0.0 * u).T for u in heads])
         parts = [self._around[i::2, :, apart] for i, apart in enumerate(self._apart)]
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
@@ -395,11 +397,6 @@ def _products(
     right = spectra if others is None else others
     # Real parts of a product are those of real and imaginary parts, side by side.
     return np.asarray(weighed.view(np.float64) @ right.view(np.float64).T)
-
-
-def _moved(head: Real) -> Real:
-    """Matrix that turns the first samples of an impulse response into those of its convolution."""
-    return np.asarray(scipy.linalg.toeplitz(head, np.zeros(head.size)).T)
 
 
 def _shifted(x: Real) -> Real:
