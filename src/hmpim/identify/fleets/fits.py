@@ -1,7 +1,7 @@
-"""Many outputs of one stimulus fitted at once under one assumption, and what that leaves uncertain.
+"""Many outputs of one stimulus fitted at once under one assumption, with their covariances.
 
-Each output is a few numbers in the basis that `learnt.py` found. Gauss and Newton's steps are taken
-for all at once; delay and poles move, the gain is solved exactly.
+Each output is a few numbers in the basis from `learnt.py`. Gauss-Newton steps in delay and poles
+are taken for all outputs at once; the gain is solved exactly.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ __all__ = ["Errors", "Fits", "descended", "errors_of", "fitted_all"]
 _STEPS = 12
 
 _NEGLIGIBLE = 1e-6
-"""Share of the noise's variance below which a step need not be made."""
+"""Gain of a step, as a share of the noise's variance, below which the fit has converged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,71 +32,56 @@ class Fits:
     theta: Real
     gain: Real
     cost: Real
-    left: Real
-    """What the fit leaves inside the basis."""
+    left: Real  # residual inside the basis
     figures: Mapping[str, Real]
 
 
 def fitted_all(fleet: Fleet, centred: Real, means: Real, power: Real) -> list[Fits]:
     """Fit all records under each assumption of the fleet, in the order of its members.
 
-    Outputs less their means, (N, n), are given with those means and with their own powers, (N,).
+    Given are outputs less their means, (N, n), those means, and the powers of the outputs, (N,).
     """
     sizes = np.cumsum([member.basis.shape[0] for member in fleet.members])
-    inside = centred @ np.concatenate([member.basis for member in fleet.members]).T
+    every = centred @ np.concatenate([member.basis for member in fleet.members]).T
     found: list[Fits] = []
-    for member, z in zip(fleet.members, np.split(inside, sizes[:-1], axis=1), strict=True):
+    for member, z in zip(fleet.members, np.split(every, sizes[:-1], axis=1), strict=True):
         low, high = member.surface.low, member.surface.high
         start = np.tile((low + high) / 2, (means.size, 1))
-        if found:  # the same units, moved by what another assumption moves
+        if found:  # the same units, shifted to another assumption
             first = found[0].member
             away = shifted(np.zeros(low.size), first.intersample, member.intersample)
-            plain = first.surface.holds(found[0].theta)[:, None]
-            start = np.where(plain, found[0].theta + away, start)
-        found.append(_fitted(fleet, member, z, means, power, np.clip(start, low, high)))
+            inside = first.surface.holds(found[0].theta)[:, None]
+            start = np.where(inside, found[0].theta + away, start)
+        outside = np.maximum(power - np.vecdot(z, z), 0.0)
+        start = np.clip(start, low, high)
+        theta = descended(member.surface, z, outside, start, samples=fleet.u.size)
+        value = member.surface.values(theta)
+        g = value[:, :-1]
+        gain = np.vecdot(z, g) / np.vecdot(g, g)
+        left = z - gain[:, None] * g
+        figures = dict(zip(fleet.names, fleet.figures.values(theta).T, strict=True))
+        figures |= {"scale_factor": gain, "bias": means - gain * value[:, -1]}
+        cost = outside + np.vecdot(left, left)
+        found.append(
+            Fits(member=member, theta=theta, gain=gain, cost=cost, left=left, figures=figures)
+        )
     return found
-
-
-def _fitted(fleet: Fleet, member: Member, z: Real, means: Real, power: Real, start: Real) -> Fits:
-    """Fit all records under one assumption."""
-    outside = np.maximum(power - np.vecdot(z, z), 0.0)
-    theta = descended(member.surface, z, outside, start, samples=fleet.u.size)
-    value = member.surface.values(theta)
-    g = value[:, :-1]
-    gain = np.vecdot(z, g) / np.vecdot(g, g)
-    left = z - gain[:, None] * g
-    values = fleet.figures.values(theta)
-    return Fits(
-        member=member,
-        theta=theta,
-        gain=gain,
-        cost=outside + np.vecdot(left, left),
-        left=left,
-        figures={
-            **dict(zip(fleet.names, values.T, strict=True)),
-            "scale_factor": gain,
-            "bias": means - gain * value[:, -1],
-        },
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Errors:
-    """What the fits of some records leave uncertain; first axis of an array: the record."""
+    """Errors of the fits of some records; first axis of an array: the record."""
 
-    rows: Real
-    """Derivatives by place and gain, in the basis."""
-    inner: Real
-    """Inverse of their Gram matrix."""
+    rows: Real  # derivatives by place and gain, in the basis
+    inner: Real  # inverse of their Gram matrix
     variance: Real
     freedom: int
     deviations: Mapping[str, Real]
-    exact: Mask
-    """Whether the polynomials of what is read off are exact enough."""
+    exact: Mask  # whether the polynomials of the figures are exact enough
 
 
 def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
-    """Standard deviations of all that is told, to first order."""
+    """Standard deviations of all figures, to first order."""
     n, theta, gain = fleet.u.size, fit.theta[some], fit.gain[some]
     value, slope = fit.member.surface.at(theta)
     size = theta.shape[1]
@@ -108,7 +93,7 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
     _, steep = fleet.figures.at(theta)
     spread = np.sum(steep * (covariance[:, :size, :size] @ steep), axis=1)
     deviations = np.sqrt(np.maximum(spread, 0.0))
-    # The bias is the mean less what the model makes of it; the mean's own error is apart.
+    # The bias is the mean less the mean of the model; the mean has its own error.
     by_mean = -np.concatenate([gain[:, None] * slope[:, :, -1], value[:, -1:]], axis=1)
     of_bias = np.vecdot(by_mean, (covariance @ by_mean[:, :, None])[:, :, 0]) + variance / n
     return Errors(
@@ -128,9 +113,9 @@ def errors_of(fleet: Fleet, fit: Fits, some: NDArray[np.intp]) -> Errors:
 def descended(surface: Surface, z: Real, outside: Real, start: Real, *, samples: int) -> Real:
     """Gauss-Newton for all records at once, the gain solved exactly at each step.
 
-    A record that has arrived is left out of what follows. The surface has places in a basis, and
-    the mean in the last column, of responses of unit gain; `z`, (k, r), are the records in that
-    basis, `outside`, (k,), is their power outside of it, and `start`, (k, p), where to begin.
+    A record that has converged is dropped from later steps. The surface gives coordinates in a
+    basis, and the mean in the last column, for responses of unit gain; `z`, (k, r), are the records
+    in that basis, `outside`, (k,), is their power outside it, and `start`, (k, p), the first point.
     """
     low, high = surface.low, surface.high
     best, least = start.copy(), np.full(z.shape[0], np.inf)
@@ -151,13 +136,13 @@ def descended(surface: Surface, z: Real, outside: Real, start: Real, *, samples:
 
 
 def _step(surface: Surface, theta: Real, z: Real, outside: Real) -> tuple[Real, Real, Real]:
-    """Cost of each record, the step from there, and by how much it lowers the cost."""
+    """Cost of each record, its next step, and by how much the step lowers the cost."""
     value, slope = surface.at(theta)
     g, dg = value[:, :-1], slope[:, :, :-1]
     square = np.vecdot(g, g)
     gain = np.vecdot(z, g) / square
     left = z - gain[:, None] * g
-    # The slopes less what the gain does; that has no part in what is left.
+    # The slopes are projected on the complement of g, to which the residual is orthogonal.
     moment = gain[:, None] * (dg @ left[:, :, None])[:, :, 0]
     along = (dg @ g[:, :, None])[:, :, 0]
     gram = dg @ dg.transpose(0, 2, 1) - along[:, :, None] * (along / square[:, None])[:, None, :]

@@ -1,16 +1,16 @@
-"""Many records of one stimulus and of second order: fitted together, by what they share.
+"""Many records of one stimulus and of second order, fitted together in a common basis.
 
-`learnt.py` tells what that is. Each output is one product with the basis, and all are fitted at
-once by the same least squares as `hmpim.identify`, in a few numbers instead of thousands.
-The basis is the stimulus' transforms and Gram matrix, made once for all. Every assumption on what
-the stimulus does between its samples is tried, and what the record does not exclude widens the
-intervals, as `hmpim.identify.reading.spanned` does it. The few records that ask by chance for one
-more pole, one in twenty, or for a zero, one in forty, are fitted by themselves, as `identify` does.
+The basis comes from `learnt.py`. Each output is projected on it once, and all are fitted at once by
+the same least squares as `hmpim.identify`, in a few numbers instead of thousands. Every assumption
+on what the stimulus does between its samples is tried, and those that the record does not exclude
+widen the intervals, as in `hmpim.identify.reading.spanned`. The few records that support one more
+pole by chance, one in twenty, or a zero, one in forty, are fitted by themselves, as `identify`
+does.
 
-The parameters and their errors are those of a fit to the record itself, as long as what the basis
-and the polynomials are off is small beside a standard deviation: `FleetFit.sound` says where it is,
-where the unit lies inside the box, where the residual is white and does not follow the input, and
-where no pole is to be added. All other records are for `identify`.
+The parameters and their errors are those of a fit to the record itself, as long as the errors of
+the basis and the polynomials are small compared with a standard deviation. `FleetFit.sound` says
+where that holds, where the unit lies inside the box, where the residual is white and does not
+follow the input, and where no pole is to be added. All other records are left to `identify`.
 """
 
 from collections.abc import Mapping
@@ -50,14 +50,14 @@ __all__ = [
 ]
 
 _ASKS = 0.98 * ONE_SIDED
-"""Standard deviations from which one more pole is asked for: a little early, as the basis is not
+"""Standard deviations from which one more pole is tested: a little early, as the basis is not
 exact; the fit to the record itself then decides."""
 
 _COVERED = 0.98 * HALF
 """The same on the other side, from which on a zero or a pair of poles is covered."""
 
 _CLOSE = 0.98 * ALMOST
-"""The same, from which on `identify` says that it almost asks for other dynamics."""
+"""The same, from which on `identify` reports that other dynamics are almost required."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,11 +73,11 @@ class Column:
 
     @classmethod
     def empty(cls, count: int, unit: str) -> "Column":
-        """So many records without a figure."""
+        """A column of some records without a figure."""
         return cls(**{k: np.full(count, np.nan) for k in _ENDS}, unit=unit)
 
     def estimate(self, i: int) -> Estimate | None:
-        """Of one record."""
+        """The figure of one record."""
         value, std = float(self.value[i]), float(self.std[i])
         if isnan(value):
             return None
@@ -89,11 +89,11 @@ class Column:
         )
 
     def copy(self) -> "Column":
-        """Another to write to."""
+        """A copy to write to."""
         return Column(**{end: getattr(self, end).copy() for end in _ENDS}, unit=self.unit)
 
     def put(self, some: NDArray[np.intp], other: "Column", kept: Mask) -> None:
-        """Take those records of another that are kept."""
+        """Copy figures of some records from another column, where they are kept."""
         for end in _ENDS:
             getattr(self, end)[some[kept]] = getattr(other, end)[kept]
 
@@ -108,24 +108,22 @@ def parameters_of(columns: Mapping[str, Column], i: int) -> Parameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Group:
-    """Records for which one assumption is taken; k of them."""
+    """The k records for which one assumption is chosen."""
 
     fit: Fits  # all records under that assumption
-    some: NDArray[np.intp]  # (k,): which they are
-    # all records under each other assumption, and of which of these it stays possible
+    some: NDArray[np.intp]  # (k,): indices of the group's records
+    # all records under each other assumption, and for which of the k it remains possible
     others: list[tuple[Fits, Mask]]
-    errors: Errors  # what the fit leaves uncertain
-    residual: Real  # (k, n): what it leaves over
-    # figures with intervals of this fit alone, and such as cover all that stays possible
-    alone: dict[str, Column]
-    spanned: dict[str, Column]
-    # delay with one more pole, in s, of those that ask for it, by their place among these
-    tails: dict[int, float]
+    errors: Errors  # of the fit
+    residual: Real  # (k, n)
+    alone: dict[str, Column]  # figures with intervals of this fit alone
+    spanned: dict[str, Column]  # figures with intervals that cover all possible models
+    tails: dict[int, float]  # delay with one more pole, in s, where it is possible
     sound: Mask  # (k,): as in `FleetFit`
     codes: list[tuple[str, ...]]  # as in `FleetFit`
 
     def has_tail(self, k: int) -> bool:
-        """Whether intervals of one of them cover one more pole or zero."""
+        """Whether intervals of a record cover one more pole or zero."""
         return any(
             not np.isnan(column.std[k]) and column.std[k] != self.alone[name].std[k]
             for name, column in self.spanned.items()
@@ -139,18 +137,17 @@ class FleetFit:
 
     # parameters by name, without the paper's delay; NaN in those of a record that is not sound
     columns: Mapping[str, Column]
-    sound: Mask  # (N,): whether they are what `identify` would say
+    sound: Mask  # (N,): whether they equal the results of `identify`
     intersample: tuple[Intersample, ...]  # the likeliest assumption for each
-    # codes of what `identify` would say beside it: 'intersample' where another assumption would
-    # move the delay and is not excluded, 'structure' where one more pole is as likely
+    # codes of the findings of `identify`: 'intersample' where another assumption would move the
+    # delay and is not excluded, 'structure' where one more pole is as likely
     codes: tuple[tuple[str, ...], ...]
     fit_percent: Real  # (N,): 100 (1 - ||y - ŷ|| / ||y - mean y||)
-    # the records by the assumption that is taken, and all that was found on the way
-    groups: tuple[Group, ...]
+    groups: tuple[Group, ...]  # the records by the chosen assumption, with intermediate results
 
 
 def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", "")) -> FleetFit:
-    """Fit many outputs, (N, n), of one stimulus at once; units are those of input and output."""
+    """Fit many outputs, (N, n), of one stimulus at once; `units` are those of input and output."""
     count, n = outputs.shape
     means = outputs.mean(axis=1)
     centred = outputs - means[:, None]
@@ -158,8 +155,8 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
     fits = fitted_all(fleet, centred, means, power)
     behind, chosen = _weighed(fleet, fits, n)
     names = (*fleet.names, "scale_factor", "bias", "noise_std")
-    told = units_of(fleet.structure, units)
-    columns = {name: Column.empty(count, told[name]) for name in names}
+    unit_of = units_of(fleet.structure, units)
+    columns = {name: Column.empty(count, unit_of[name]) for name in names}
     sound = np.zeros(count, dtype=bool)
     codes: list[tuple[str, ...]] = [()] * count
     groups: list[Group] = []
@@ -167,12 +164,12 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
         some = np.flatnonzero(chosen == k)
         if some.size == 0:
             continue
-        open_ = [
+        others = [
             (rival, behind[j, some] - behind[k, some] < 2 * CLEARLY)
             for j, rival in enumerate(fits)
             if j != k
         ]
-        group = _told(fleet, fit, some, open_, outputs[some], told)
+        group = _group_of(fleet, fit, some, others, outputs[some], unit_of)
         groups.append(group)
         sound[some] = group.sound
         for name, column in group.spanned.items():
@@ -191,7 +188,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
 
 
 def _weighed(fleet: Fleet, fits: list[Fits], n: int) -> tuple[Real, NDArray[np.intp]]:
-    """Criterion of each record under each assumption, and which is taken."""
+    """Criterion of each record under each assumption, and the chosen assumption."""
     tiny = np.finfo(float).tiny
     criterion = np.stack([n * np.log(np.maximum(fit.cost, tiny)) for fit in fits])
     chosen = criterion.argmin(axis=0)
@@ -203,7 +200,7 @@ def _weighed(fleet: Fleet, fits: list[Fits], n: int) -> tuple[Real, NDArray[np.i
     return criterion, chosen
 
 
-def _told(
+def _group_of(
     fleet: Fleet,
     fit: Fits,
     some: NDArray[np.intp],
@@ -211,49 +208,44 @@ def _told(
     outputs: Real,
     units: Mapping[str, str],
 ) -> Group:
-    """Parameters of some records under the assumption that is taken; which are sound; what is said.
-
-    The records are `some` of those fitted; `others` tells which other assumptions stay possible.
-    """
+    """Read and test some records under the chosen assumption."""
     theta = fit.theta[some]
     errors = errors_of(fleet, fit, some)
     sound = _is_plain(fit.member, theta, fit.gain[some], errors.variance) & errors.exact
     apart = np.zeros(some.size, dtype=bool)
-    for rival, stays in others:
-        there = rival.theta[some]
-        sound &= ~stays | _is_plain(
-            rival.member, there, rival.gain[some], errors.variance, off=PART
-        )
-        apart |= stays & (np.abs(there[:, 0] - theta[:, 0]) > FEW)
-    sound &= fit.figures["natural_frequency"][some] < fleet.highest  # beyond it no peak is told
-    asked = _asks_for_a_pole(fit, some, errors)
-    sound &= asked > -_CLOSE
+    for rival, possible in others:
+        there, gain = rival.theta[some], rival.gain[some]
+        sound &= ~possible | _is_plain(rival.member, there, gain, errors.variance, off=PART)
+        apart |= possible & (np.abs(there[:, 0] - theta[:, 0]) > FEW)
+    sound &= fit.figures["natural_frequency"][some] < fleet.highest  # no peak is known beyond it
+    score = _score_of_a_pole(fit, some, errors)
+    sound &= score > -_CLOSE
     model = fit.gain[some, None] * fit.member.surface.values(theta)[:, :-1] @ fit.member.basis
     residual = outputs - outputs.mean(axis=1, keepdims=True) - model
     sound[sound] = _leaves_noise(fleet, theta[sound], residual[sound])
     sound[sound] = _is_continuous(outputs[sound], fleet.fs)
     alone, spanned = _columns(fleet, fit, some, others, errors, units)
     codes = [("intersample",) * moved for moved in apart.tolist()]
-    asking: dict[int, float] = {}
-    for i in np.flatnonzero(sound & ((asked > _ASKS) | (asked < -_COVERED))).tolist():
+    tails: dict[int, float] = {}
+    for i in np.flatnonzero(sound & ((score > _ASKS) | (score < -_COVERED))).tolist():
         own = parameters_of(alone, i)
-        tails = with_tails(fleet, fit.member, theta[i], outputs[i], own)
-        sound[i] = tails is not None and (tails[1] is not None or asked[i] < _CLOSE)
-        if tails is None:
+        tail = with_tails(fleet, fit.member, theta[i], outputs[i], own)
+        sound[i] = tail is not None and (tail[1] is not None or score[i] < _CLOSE)
+        if tail is None:
             continue
-        wide, delay = tails
+        wide, delay = tail
         widen(spanned, i, own, wide)
         if delay is not None:
             codes[i] = ("structure", *codes[i])
-            asking[i] = delay
-    for name in SIZES:
-        if name in spanned:
-            sound &= ~_is_wide(spanned[name])
-    for name in spanned:
+            tails[i] = delay
+    for name, column in spanned.items():
+        if name in SIZES:  # an interval over several models may be too wide for a figure
+            wide_open = column.high - column.low > PART * np.abs(column.value)
+            sound &= ~(np.isnan(column.std) & wide_open)
         if name.startswith("bandwidth"):
-            beyond = spanned[name].value > fleet.highest
+            beyond = column.value > fleet.highest
             for end in _ENDS:
-                getattr(spanned[name], end)[beyond] = np.nan
+                getattr(column, end)[beyond] = np.nan
     return Group(
         fit=fit,
         some=some,
@@ -262,7 +254,7 @@ def _told(
         residual=residual,
         alone=alone,
         spanned=spanned,
-        tails=asking,
+        tails=tails,
         sound=sound,
         codes=codes,
     )
@@ -276,13 +268,13 @@ def _columns(
     errors: Errors,
     units: Mapping[str, str],
 ) -> tuple[dict[str, Column], dict[str, Column]]:
-    """What some fits tell alone, and with intervals that cover the other assumptions."""
+    """Figures of some fits alone, and with intervals that cover the other assumptions."""
     half = float(scipy.special.stdtrit(errors.freedom, 0.975))
     alone, spanned = {}, {}
     for name, std in errors.deviations.items():
         value, unit = fit.figures[name][some], units[name]
         column = partial(Column, value=value, unit=unit)
-        moved = [np.where(stays, rival.figures[name][some] - value, 0.0) for rival, stays in others]
+        moved = [np.where(on, rival.figures[name][some] - value, 0.0) for rival, on in others]
         every = np.array([0.0 * value, *moved])
         below, above = every.min(axis=0), every.max(axis=0)
         widened = np.maximum(above, -below) > FEW * half * std
@@ -307,7 +299,7 @@ def _columns(
 
 
 def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
-    """Let the intervals of one record cover what `spanned` made of its own, and what they cover."""
+    """Let the intervals of one record cover `tails`, which `spanned` made from its `own` ones."""
     for name, column in columns.items():
         tail = getattr(tails, name)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):
@@ -320,25 +312,18 @@ def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters
         column.low[i], column.high[i] = low, high
 
 
-def _is_wide(column: Column) -> Mask:
-    """Whether what several models allow is no figure any more."""
-    return np.asarray(
-        np.isnan(column.std) & (column.high - column.low > PART * np.abs(column.value))
-    )
-
-
-def _asks_for_a_pole(fit: Fits, some: NDArray[np.intp], errors: Errors) -> Real:
-    """By how many standard deviations records ask for one more pole, as the score test has it."""
+def _score_of_a_pole(fit: Fits, some: NDArray[np.intp], errors: Errors) -> Real:
+    """Score test of one more pole for some records, in standard deviations."""
     row = fit.gain[some, None] * fit.member.grown.values(fit.theta[some])
     along = (errors.inner @ (errors.rows @ row[:, :, None]))[:, :, 0]
-    own = row - np.einsum("ia,iaj->ij", along, errors.rows)  # what no other parameter can do
+    own = row - np.einsum("ia,iaj->ij", along, errors.rows)  # no other parameter imitates this
     score = np.vecdot(own, fit.left[some])
     power = np.vecdot(own, own) * fit.cost[some] / (errors.freedom - 1)
     return np.asarray(score / np.sqrt(np.maximum(power, np.finfo(float).tiny)))
 
 
 def _is_plain(member: Member, theta: Real, gain: Real, variance: Real, *, off: float = FEW) -> Mask:
-    """Whether each unit lies inside the box, and the surface is exact enough for its noise."""
+    """Which units lie inside the box, with a surface that is exact enough for their noise."""
     inside = member.surface.holds(theta) & np.isfinite(theta).all(axis=1)
     return np.asarray(inside & (np.abs(gain) * member.lost <= off * np.sqrt(variance)))
 
@@ -364,6 +349,6 @@ def _is_continuous(outputs: Real, fs: float) -> Mask:
     plain = (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
     for i in np.flatnonzero(~plain).tolist():
         found = find_imperfections(outputs[i], fs)
-        seen = (found.saturation, found.hold, found.quantization, found.repeated, found.levels)
-        plain[i] = all(what is None for what in seen)
+        any_of = (found.saturation, found.hold, found.quantization, found.repeated, found.levels)
+        plain[i] = all(effect is None for effect in any_of)
     return np.asarray(plain)

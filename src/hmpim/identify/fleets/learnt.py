@@ -1,10 +1,10 @@
-"""What records of one stimulus and of second order share, learnt from the first of them.
+"""Common properties of records of one stimulus and of second order, learnt from the first records.
 
-What a model of one structure can make of one stimulus is a surface of few dimensions in the space
-of records. Over the box in which the units of a fleet lie it is sampled once: an orthonormal basis
-of some ten to sixty rows holds it, and a polynomial says where on it a model lies. There is one
-such surface for each assumption on what the stimulus does between its samples, unless that is
-stated, and beside each the surface of what one more pole would add.
+The outputs of a model of one structure are a surface of few dimensions in the space of records.
+This surface is sampled once over the box that contains the units of a fleet: an orthonormal basis
+of some ten to sixty rows spans it, and a polynomial gives the coordinates of a model in the basis.
+There is one such surface for each assumption on what the stimulus does between its samples, unless
+that is stated, and a second one for the change that one more pole would cause.
 """
 
 from collections.abc import Iterable, Sequence
@@ -37,26 +37,26 @@ __all__ = [
 
 
 _DEGREES = (9, 12, 15)
-"""Degrees of a surface, tried in turn until it is off by less than the noise lets be seen."""
+"""Degrees of a surface, tried in turn until its error is small compared with the noise."""
 
 _SMOOTHER = 7
-"""Degree for what is read off a model, and for what one more pole adds."""
+"""Degree for the figures of a model, and for the change that one more pole causes."""
 
 _UNSEEN = 1e-9
 """Share of the greatest singular value below which a direction of the surface is left out."""
 
 _MOST = 150
-"""Directions that are looked for at most; a surface that has more is not held by them."""
+"""Greatest number of directions; a surface that has more is not represented."""
 
 _CLEAR = 100.0
 """By how much the criterion must prefer the structure, so that no other widens its bars."""
 
 _WIDE = 5.0
-"""Half a side of the box, in deviations of the units that it is learnt from: of sixteen, what one
-more unit exceeds once in 5000 (Student)."""
+"""Half a side of the box, in deviations of the units that it is learnt from: with sixteen, one more
+unit is outside once in 5000 (Student)."""
 
 _APART = (0.1, 0.02, 0.02)
-"""What another assumption moves beside half a sample: samples, and shares of ω and ζ."""
+"""Shift by another assumption, in addition to half a sample: samples, and shares of ω and ζ."""
 
 _PROBE = 0.3
 """Time constant, over the unit's own, at which one more pole is tried."""
@@ -72,40 +72,40 @@ class Member:
 
     intersample: Intersample  # what the stimulus does between its samples
     basis: Real  # (r, n): orthonormal, each row without mean
-    # places in the basis, and the mean in the last column, of the unit-gain response; a function of
-    # the delay in samples and of the logarithms of ω and ζ
+    # coordinates in the basis, and the mean in the last column, of the unit-gain response; a
+    # function of the delay in samples and of the logarithms of ω and ζ
     surface: Surface
-    # places in the basis of what one more pole adds, over the square of its time constant
+    # coordinates of the change that one more pole causes, over the square of its time constant
     grown: Surface
-    lost: float  # largest root of the sum of squares of what the basis and the surface leave out
+    lost: float  # largest norm of the error of the basis and the surface
     source: SampledInput  # the stimulus, prepared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fleet:
-    """What records of one stimulus share."""
+    """Common properties of records of one stimulus."""
 
     u: Real  # (n,): the stimulus
     fs: float  # rate in Hz
     band: tuple[float, float]  # excited band in Hz
     structure: Structure  # of every unit
-    natural: Intersample  # assumption that stands unless another is likelier at odds of 20
-    members: tuple[Member, ...]  # one for each assumption that is open
-    figures: Surface  # what is read off a model of unit gain, in the order of `names`
+    natural: Intersample  # assumption that is kept unless another is likelier at odds of 20
+    members: tuple[Member, ...]  # one for each possible assumption
+    figures: Surface  # figures of a model of unit gain, in the order of `names`
     names: tuple[str, ...]  # fields of `Parameters`
 
     @property
     def highest(self) -> float:
-        """Frequency in Hz beyond which nothing is read off."""
+        """Frequency in Hz beyond which no figure is read off."""
         return min(self.band[1], self.fs / 2)
 
 
 def learn_fleet(
     u: Real, pairs: Sequence[PairIdentification], *, fs: float, band: tuple[float, float]
 ) -> Fleet | None:
-    """Learn from some units what a fleet shares; None where most are not of one kind.
+    """Learn the common properties of a fleet from some units; None where most are not of one kind.
 
-    The stimulus, (n,), is common to all; `pairs` are what `identify` said of five units or more;
+    The stimulus, (n,), is common to all; `pairs` are results of `identify` for five units or more;
     rate and excited band are in Hz.
     """
     structure = STRUCTURES["second_order"]
@@ -125,10 +125,14 @@ def learn_fleet(
     read = [_figures_at(theta_at(place), structure, fs) for place in places]
     names = tuple(read[0])
     if any(tuple(r) != names for r in read):
-        return None  # a figure that some units of the box have and others do not
+        return None  # some units of the box lack a figure that others have
     values = np.array([list(r.values()) for r in read])
     natural: Intersample = "bandlimited" if len(open_) > 1 else found
-    noise = float(np.median([_noise_over_gain(pair) for pair in alike]))
+    noises = [
+        noise.value / abs(gain.value) if noise is not None and gain is not None else 0.0
+        for noise, gain in ((pair.noise_std, pair.scale_factor) for pair in alike)
+    ]
+    noise = float(np.median(noises))
     enough = {mode: noise * (FEW if mode == natural else PART) for mode in open_}
     return Fleet(
         u=u,
@@ -145,8 +149,8 @@ def learn_fleet(
 
 
 def is_alike(pair: PairIdentification) -> bool:
-    """Whether nothing but its structure, clearly, is said of a unit."""
-    if pair.structure != "second_order":  # of a simpler one, a second pole is never clearly absent
+    """Whether a unit is clearly of second order, without any doubt or imperfection."""
+    if pair.structure != "second_order":  # a second pole is never clearly absent
         return False
     rivals = [c.criterion for c in pair.candidates if c.structure != pair.structure]
     chosen = next((c.criterion for c in pair.candidates if c.chosen), np.inf)
@@ -159,17 +163,30 @@ def is_alike(pair: PairIdentification) -> bool:
 
 
 def _box(pairs: Sequence[PairIdentification], fs: float) -> tuple[Real, Real]:
-    """Where units of the fleet lie, under the assumption under which they were found."""
-    own = fs * max(_own_error(pair) for pair in pairs)
-    least = np.array([max(3 * own, 0.02), 0.005, 0.005])
-    return box_around(np.array([_place(pair, fs) for pair in pairs]), least)
+    """The box that contains the units of a fleet, under the assumption chosen for these units.
+
+    A unit lies at its delay in samples and the logarithms of ω and ζ. The error of a delay is that
+    of the fit alone: its interval may cover other models too, but a missing pole or zero does not
+    move the best fit.
+    """
+    places, errors = [], []
+    for pair in pairs:
+        assert pair.delay is not None
+        assert pair.covariance is not None
+        second, first, unit = pair.denominator
+        omega = float(np.sqrt(unit / second))
+        zeta = first / unit * omega / 2
+        places.append([pair.delay.value * fs, np.log(omega / fs), np.log(zeta)])
+        errors.append(float(np.sqrt(pair.covariance[0, 0])))
+    least = np.array([max(3 * (fs * max(errors)), 0.02), 0.005, 0.005])
+    return box_around(np.array(places), least)
 
 
 def box_around(places: Real, least: Real) -> tuple[Real, Real]:
-    """Return the corners of a box that holds units like these, all but one in a thousand.
+    """Return the corners of a box that contains all but one in a thousand units like these.
 
-    Some units lie at `places`, (k, d); `least`, (d,), are deviations between units that are allowed
-    for anyway.
+    Some units lie at `places`, (k, d); `least`, (d,), are the smallest deviations between units
+    that are assumed.
 
     Examples
     --------
@@ -178,7 +195,7 @@ def box_around(places: Real, least: Real) -> tuple[Real, Real]:
     ([-7.41], [7.41])
     """
     middle = np.median(places, axis=0)
-    # Of so few the median deviation alone may come out half as large as it is.
+    # With so few units the median deviation alone may be too small by half.
     spread = np.maximum(
         1.4826 * np.median(np.abs(places - middle), axis=0), np.std(places, axis=0, ddof=1)
     )
@@ -188,96 +205,66 @@ def box_around(places: Real, least: Real) -> tuple[Real, Real]:
 
 
 def _moved(box: tuple[Real, Real], found: Intersample, mode: Intersample) -> tuple[Real, Real]:
-    """Where they lie under another assumption."""
+    """The box under another assumption."""
     apart = np.array(_APART) * (mode != found)
     away = shifted(np.zeros(3), found, mode)
     return box[0] + away - apart, box[1] + away + apart
 
 
-def _own_error(pair: PairIdentification) -> float:
-    """Deviation of a delay in s, of the fit alone: its interval may cover other models besides.
-
-    The box is about where the best fit may lie, and a missing pole or zero does not move that.
-    """
-    assert pair.covariance is not None
-    return float(np.sqrt(pair.covariance[0, 0]))
-
-
-def _place(pair: PairIdentification, fs: float) -> Real:
-    """Where a unit lies: delay in samples, logarithms of ω and ζ."""
-    assert pair.delay is not None
-    second, first, unit = pair.denominator
-    omega = float(np.sqrt(unit / second))
-    zeta = first / unit * omega / 2
-    return np.array([pair.delay.value * fs, np.log(omega / fs), np.log(zeta)])
-
-
 def theta_at(place: Real) -> Real:
-    """Return the parameters of a fit at a place of a surface.
+    """Return the parameters of a fit at a point of the box.
 
-    ω and ζ move more independently of each other than the fit's own, so that a box is smaller.
+    ω and ζ are less correlated than the fit's own parameters, so that a box is smaller.
     """
     omega, zeta = np.exp(place[1:])
     return np.array([place[0], np.log(2 * zeta / omega), 0.25 / zeta**2])
 
 
-def _noise_over_gain(pair: PairIdentification) -> float:
-    noise, gain = pair.noise_std, pair.scale_factor
-    return 0.0 if noise is None or gain is None else noise.value / abs(gain.value)
-
-
 def _member(
     u: Real, structure: Structure, mode: Intersample, low: Real, high: Real, *, enough: float
 ) -> Member:
-    """The surface of the first degree that is off by no more than is enough, or of the last."""
-    for degree in _DEGREES:
-        found = _member_of(u, structure, mode, low, high, degree=degree)
-        if found.lost <= enough:
-            break
-    return found
-
-
-def _member_of(
-    u: Real, structure: Structure, mode: Intersample, low: Real, high: Real, *, degree: int
-) -> Member:
-    source, richer = prepare_input(u, mode), one_more_pole(structure)
-    places = places_in(low, high, degree)
-    smoother = places_in(low, high, _SMOOTHER)  # the first of the others
-    rows = answers(source, structure, [theta_at(place) for place in places])
+    """The surface of the first degree whose error is small enough, or of the last degree."""
+    source, smoother = prepare_input(u, mode), places_in(low, high, _SMOOTHER)
     lags = _PROBE * np.exp(-smoother[:, 1])  # over 1/ω, the unit's own
     poles = [
         with_pole(structure, theta_at(place), float(lag))
         for place, lag in zip(smoother, lags, strict=True)
     ]
-    grown = (answers(source, richer, poles) - rows[: lags.size]) / lags[:, None] ** 2
-    grown -= grown.mean(axis=1, keepdims=True)
-    basis, values = in_basis(rows, grown)
-    surface = Surface.fitted(low, high, places, values, degree=degree)
-    left = np.linalg.norm(rows - values @ np.vstack([basis, np.ones(source.samples)]), axis=1).max()
+    richer = answers(source, one_more_pole(structure), poles)
+    for degree in _DEGREES:
+        places = places_in(low, high, degree)  # `smoother` are the first of these
+        rows = answers(source, structure, [theta_at(place) for place in places])
+        grown = (richer - rows[: lags.size]) / lags[:, None] ** 2
+        grown -= grown.mean(axis=1, keepdims=True)
+        basis, values = in_basis(rows, grown)
+        surface = Surface.fitted(low, high, places, values, degree=degree)
+        left = rows - values @ np.vstack([basis, np.ones(source.samples)])
+        lost = float(np.linalg.norm(left, axis=1).max() + np.linalg.norm(surface.error))
+        if lost <= enough:
+            break
     return Member(
         intersample=mode,
         basis=basis,
         surface=surface,
         grown=Surface.fitted(low, high, smoother, grown @ basis.T, degree=_SMOOTHER),
-        lost=float(left + np.linalg.norm(surface.error)),
+        lost=lost,
         source=source,
     )
 
 
 def answers(source: SampledInput, structure: Structure, thetas: Iterable[Real]) -> Real:
-    """Return what one structure of unit gain makes of a stimulus, (m, n), at some parameters."""
+    """Return the outputs of one structure of unit gain, (m, n), at some parameters."""
     size = source.samples
     problem = Problem(source=source, y=np.zeros(size), valid=None, longest_delay=float(size))
     return np.stack([Part(problem, structure, theta).driven(np.ones(1)) for theta in thetas])
 
 
 def in_basis(rows: Real, *others: Real) -> tuple[Real, Real]:
-    """Return an orthonormal basis, (r, n), of rows less their means and of others without mean.
+    """Return an orthonormal basis, (r, n), of rows less their means, (m, n), and of other rows.
 
-    Rows have shape (m, n). With it come their places in it, and their means in the last column,
-    (m, r + 1). It is found from random sums of all rows: N. Halko, P. G. Martinsson, J. A. Tropp,
-    SIAM Review 53, 2011: so many sums span the rows as well as all of them do, once they are more
-    than the rows have dimensions.
+    Also returned are the coordinates of the rows, and their means in the last column, (m, r + 1).
+    The basis is that of random sums of all rows, which span the same space if they are more than
+    its dimensions: N. Halko, P. G. Martinsson, J. A. Tropp, SIAM Review 53, 2011.
     """
     means = rows.mean(axis=1, keepdims=True)
     rows = rows - means
@@ -289,7 +276,7 @@ def in_basis(rows: Real, *others: Real) -> tuple[Real, Real]:
 
 
 def _figures_at(theta: Real, structure: Structure, fs: float) -> dict[str, float]:
-    """What is read off the model of unit gain at a place, up to half the rate."""
+    """Figures of the model of unit gain at a point of the box, up to half the rate."""
     vector = np.concatenate([theta, [1.0, 0.0]])
     found = figures_at(structure, vector, fs=fs, highest=fs / 2)
     own = ("scale_factor", "bias")

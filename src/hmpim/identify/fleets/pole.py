@@ -1,7 +1,7 @@
-"""One more pole or zero for one record of a fleet: the few that ask for it, most of them by chance.
+"""One more pole or zero for single records of a fleet, most of which need it by chance.
 
-The record itself is fitted here, from where the fit of all ended, grown as
-`hmpim.identify.fitting.joint` grows a fit, and its intervals are widened as those of any record.
+The record itself is fitted, starting from the common fit, with poles added as in
+`hmpim.identify.fitting.joint`, and its intervals are widened as for any record.
 """
 
 from dataclasses import replace
@@ -12,13 +12,12 @@ from hmpim.identify.fitting.growth import grow, hidden_pole
 from hmpim.identify.fitting.rows import Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
 from hmpim.identify.fleets.learnt import Fleet, Member, theta_at
-from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import Parameters
 from hmpim.identify.signals import longest_lag
 from hmpim.model.dynamics import STRUCTURES, Structure
 
-__all__ = ["alone_of", "joint_of", "with_tails"]
+__all__ = ["alone_of", "with_tails"]
 
 
 def with_tails(
@@ -26,41 +25,38 @@ def with_tails(
 ) -> tuple[Parameters, float | None] | None:
     """Fit one more pole to a record, (n,); None if the likelihood pays for it.
 
-    `place`, (3,), is where the record lies on the member's surface, and `own` what the fit without
-    the pole says. Returned are parameters with intervals that cover one more pole or zero where the
-    record asks for it by more than chance; and the delay, in s, with a pole that is as likely but
-    for its price.
+    `place`, (3,), is the record's point on the member's surface, and `own` are the parameters
+    without the pole. Returned are parameters with intervals that cover one more pole or zero where
+    the record supports it by more than chance; and the delay, in s, with a pole that is as likely
+    except for its price.
     """
-    problem, best = alone_of(fleet, member, place, y)
+    joint = alone_of(fleet, member, place, y)
+    problem = joint.problem
 
     def refit(structure: Structure, theta: Real) -> Trial:
         return trial_of(member.intersample, fit_structure(problem, structure, theta), y.size)
 
     growth = grow(
-        best,
+        joint.best,
         hidden=lambda trial: hidden_pole(problem, trial.fit),
         refit=refit,
         count=lambda *_: float(y.size),
         names=tuple(STRUCTURES),
-        white=lambda trial: is_white(trial.fit.residual),
+        white=lambda trial: trial.fit.is_white,
     )
     if growth.grown:
         return None
-    joint = replace(joint_of(problem, best), rivals=growth.rivals, hidden=growth.hidden)
+    joint = replace(joint, rivals=growth.rivals, hidden=growth.hidden)
     delay = growth.rivals[0].fit.delay / fleet.fs if growth.rivals else None
     return spanned(own, joint, fs=fleet.fs, highest=fleet.highest), delay
 
 
-def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> tuple[Problem, Trial]:
-    """Return one record's own data and fit, from where the fit of all together ended."""
-    longest = longest_lag(y.size) + 2.0  # as of every record
+def alone_of(fleet: Fleet, member: Member, place: Real, y: Real) -> JointFit:
+    """Fit one record by itself, starting from the common fit, without rivals."""
+    longest = longest_lag(y.size) + 2.0  # as for every record
     problem = Problem(source=member.source, y=y, valid=None, longest_delay=longest)
     fit = fit_structure(problem, fleet.structure, theta_at(place))
-    return problem, trial_of(member.intersample, fit, y.size)
-
-
-def joint_of(problem: Problem, best: Trial) -> JointFit:
-    """Return a fit without rivals, as `hmpim.identify.reading.spanned` takes it."""
+    best = trial_of(member.intersample, fit, y.size)
     return JointFit(
         problem=problem,
         weighed=problem,

@@ -1,12 +1,9 @@
-"""Which records of a fleet `identify` would say nothing more of: its own tests, for all at once.
+"""Records of a fleet without further findings: the tests of `identify`, for all at once.
 
-A fit of all together tells parameters; that nothing else is to be said takes the tests that
-`identify` makes of what a fit leaves over. Here each is made for all records of a group by the
-same functions, with the same chances. A record for which any of them is not clearly quiet is for
-`identify` itself, so that no finding is lost and none is made up.
+The common fit gives parameters only. Here the residuals of all records of a group are tested by the
+same functions as in `identify`, with the same chances. A record that fails any test is left to
+`identify`, so that no finding is lost and none is invented.
 """
-
-from collections.abc import Iterator
 
 import numpy as np
 import scipy
@@ -33,35 +30,40 @@ __all__ = ["are_quiet"]
 Places = NDArray[np.intp]
 
 _AT_ONCE = 16
-"""Records whose derivatives are held at once."""
+"""Records whose derivatives are held in memory at once."""
 
 _FORGOTTEN = 40.0
-"""Time constants after which nothing is left of a free response: e⁻⁴⁰ is rounding."""
+"""Time constants after which a free response has vanished: e⁻⁴⁰ is rounding."""
 
 _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
          "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
-"""Figures whose deviation is held against them."""
+"""Figures whose relative deviation is checked."""
 
 
 def are_quiet(
-    fleet: Fleet, group: Group, outputs: Real, *, behind: Real, sweep: SweepPhase | None
+    fleet: Fleet, group: Group, outputs: Real, *, simpler: Real, sweep: SweepPhase | None
 ) -> Mask:
-    """Return which records of a group give no test of `identify` anything to say, shape (k,).
+    """Return which records of a group pass every test of `identify`, shape (k,).
 
-    Their outputs have shape (k, n); `behind`, (k, s), holds the least sums of squares that simpler
-    structures leave of each; `sweep` is the stimulus' phase, if it is a sweep.
+    Their outputs have shape (k, n); `simpler`, (k, s), are the least residual sums of squares of
+    simpler structures; `sweep` is the stimulus' phase, if it is a sweep.
     """
-    quiet = group.sound & _is_told(fleet, group, behind)
+    quiet = group.sound & _is_well_known(fleet, group, simpler)
     alike = [likeness(fleet.u, output, longest_lag(fleet.u.size)) for output in outputs]
-    lags = np.array([one.lag for one in alike])
-    quiet &= ~stand_out(group.residual) & [one.lead is None for one in alike]
-    for test in (_unfolded, _unanswered):
-        some = np.flatnonzero(quiet)
-        quiet[some] = test(fleet, group, some)
+    lags = np.array([own.lag for own in alike])
+    quiet &= ~stand_out(group.residual) & [own.lead is None for own in alike]
+    some = np.flatnonzero(quiet)
+    quiet[some] = _unfolded(fleet, group, some)
+    some = np.flatnonzero(quiet)  # with feedback the stimulus would depend on the noise
+    quiet[some] = chances_without_feedback(fleet.u, group.residual[some]) > FALSE_ALARM
     some = np.flatnonzero(quiet)
     quiet[some] = _linear(fleet, group, some, outputs[some], sweep)
     some = np.flatnonzero(quiet)
-    for part, rows in _derivatives(fleet, group, some):
+    for at in range(0, some.size, _AT_ONCE):
+        part = some[at : at + _AT_ONCE]
+        rows = np.empty((part.size, group.errors.rows.shape[1] + 1, fleet.u.size))
+        rows[:, :-1] = group.errors.rows[part] @ group.fit.member.basis  # by its parameters
+        rows[:, -1] = 1.0
         left = group.residual[part]
         halves = products_of_halves(rows, left)
         chance, gained = halves_of(halves, left.shape[1], share=1.0)
@@ -71,27 +73,27 @@ def are_quiet(
     return np.asarray(quiet)
 
 
-def _is_told(fleet: Fleet, group: Group, behind: Real) -> Mask:
-    """Where each figure is known well enough, and no simpler structure comes near."""
+def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
+    """Where each figure is known well enough, and every simpler structure is excluded."""
     fit, fs, n = group.fit, fleet.fs, fleet.u.size
     cost = fit.cost[group.some]
-    told = n * np.log(behind / cost[:, None]).min(axis=1) > 2 * EXCLUDED
+    known = n * np.log(simpler / cost[:, None]).min(axis=1) > 2 * EXCLUDED
     for name in _TOLD:
         if name in group.alone:
             column = group.alone[name]
-            told &= column.std <= MUCH * np.abs(column.value)
+            known &= column.std <= MUCH * np.abs(column.value)
     delay = group.alone["delay"]
-    told &= (delay.value > 0) & (delay.std <= np.maximum(BLURRED / fs, MUCH * delay.value))
+    known &= (delay.value > 0) & (delay.std <= np.maximum(BLURRED / fs, MUCH * delay.value))
     # The slower of two poles, 1 + 2ζ s/ω + s²/ω².
     omega, zeta = np.exp(fit.theta[group.some, 1:].T)
     slowest = (zeta + np.sqrt(np.maximum(zeta**2 - 1.0, 0.0))) / omega
     slowest = np.where(zeta < 1.0, 1.0 / (zeta * omega), slowest)
-    told &= np.maximum(fit.theta[group.some, 0], 0.0) + FORGETS * slowest <= n
-    return np.asarray(told & (slowest <= MUCH * n))
+    known &= np.maximum(fit.theta[group.some, 0], 0.0) + FORGETS * slowest <= n
+    return np.asarray(known & (slowest <= MUCH * n))
 
 
 def _unfolded(fleet: Fleet, group: Group, some: Places) -> Mask:
-    """Where what the stimulus does beyond half the rate is certainly no part of the noise."""
+    """Where the stimulus beyond half the rate certainly adds nothing to the noise."""
     if group.fit.member.intersample != "bandlimited":
         return np.ones(some.size, dtype=bool)
     which = group.some[some]
@@ -100,15 +102,10 @@ def _unfolded(fleet: Fleet, group: Group, some: Places) -> Mask:
     return np.asarray(most <= 2 * FEW * group.fit.cost[which] / fleet.u.size)
 
 
-def _unanswered(fleet: Fleet, group: Group, some: Places) -> Mask:
-    """Where the stimulus answers nothing of the noise."""
-    return np.asarray(chances_without_feedback(fleet.u, group.residual[some]) > FALSE_ALARM)
-
-
 def _linear(
     fleet: Fleet, group: Group, some: Places, outputs: Real, sweep: SweepPhase | None
 ) -> Mask:
-    """Where nothing of the residual is what a linear system cannot make."""
+    """Where the residual shows no nonlinearity."""
     quiet = np.ones(some.size, dtype=bool)
     for at in range(0, some.size, _AT_ONCE):
         here = slice(at, at + _AT_ONCE)
@@ -127,21 +124,11 @@ def _linear(
     return quiet
 
 
-def _derivatives(fleet: Fleet, group: Group, some: Places) -> Iterator[tuple[Places, Real]]:
-    """Some records, and the derivatives of their predictions, shape (k, 5, n)."""
-    for at in range(0, some.size, _AT_ONCE):
-        part = some[at : at + _AT_ONCE]
-        rows = np.empty((part.size, group.errors.rows.shape[1] + 1, fleet.u.size))
-        rows[:, :-1] = group.errors.rows[part] @ group.fit.member.basis
-        rows[:, -1] = 1.0
-        yield part, rows
-
-
 def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Places) -> Mask:
-    """Where the record begins at rest, as `hmpim.identify.fitting.beginning` asks it.
+    """Where the record begins at rest, by the tests of `hmpim.identify.fitting.beginning`.
 
-    Neither what comes before the first answer is more than noise, nor what rings at the ends, nor
-    is there a free response.
+    The residual is noise before the output responds and at the ends, where a spline may ring, and
+    there is no free response.
     """
     n = fleet.u.size
     left, which = group.residual[part], group.some[part]
@@ -176,9 +163,9 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
 
 
 def _free_responses(modes: Real, samples: int) -> Real:
-    """Both free responses of second-order units, ω in rad a sample and ζ, (k, 2); (k, 2, m).
+    """Both free responses, (k, 2, m), of second-order units with ω in rad per sample and ζ, (k, 2).
 
-    No longer than the record, and none of them lasts longer than m samples.
+    They end when all have vanished, or with the record.
     """
     omega, zeta = modes[:, 0, None], modes[:, 1, None]
     away = omega * np.sqrt(zeta**2 - 1.0 + 0j)

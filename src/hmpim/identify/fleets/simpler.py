@@ -1,8 +1,7 @@
-"""Simpler structures beside that of a fleet, fitted to all its records at once.
+"""Simpler structures than that of a fleet, fitted to all its records at once.
 
-`hmpim.identify` weighs them against the one that is chosen, and says by how much they are behind.
-What such a structure makes of one stimulus is a surface of one or two parameters, held as
-`hmpim.identify.fleets.learnt` holds that of the fleet.
+`hmpim.identify` compares them with the chosen one. The outputs of such a structure are a surface of
+one or two parameters, represented as in `hmpim.identify.fleets.learnt`.
 """
 
 from collections import Counter
@@ -29,14 +28,14 @@ __all__ = ["Simpler", "costs_of", "learn_simpler"]
 _DEGREE = 9
 
 _LEAST = (0.02, 0.005)
-"""Deviations between units that are allowed for anyway: samples, and the logarithm of a time."""
+"""Least deviations between units that are assumed: samples, and the logarithm of a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Simpler:
-    """One structure that is weighed against that of the fleet, as its natural `Member` is held.
+    """One simpler structure under the natural assumption, with a surface as of a `Member`.
 
-    Its surface is a function of the fit's own parameters.
+    The surface is a function of the fit's own parameters.
     """
 
     structure: Structure
@@ -47,9 +46,9 @@ class Simpler:
 def learn_simpler(
     fleet: Fleet, pairs: Sequence[PairIdentification], outputs: Sequence[Real]
 ) -> tuple[Simpler, ...] | None:
-    """Learn where the simpler structures lie; None where most were held against different ones.
+    """Learn the surfaces of simpler structures from results of `identify` and outputs, (n,).
 
-    From what `identify` said of some records, and from their outputs, (n,).
+    None where most records were compared with different structures.
     """
     tried = [
         frozenset(
@@ -59,7 +58,7 @@ def learn_simpler(
         )
         for pair in pairs
     ]
-    # One whose first climb was not at its end is held against them under other assumptions as well.
+    # A record whose first fit had not converged is compared under other assumptions as well.
     ordinary, count = Counter(tried).most_common(1)[0]
     if 2 * count < len(tried) or any(mode != fleet.natural for _, mode in ordinary):
         return None
@@ -67,51 +66,33 @@ def learn_simpler(
     if any(STRUCTURES[name].order > 1 or STRUCTURES[name].parameters > 5 for name in names):
         return None
     usual = [output for output, own in zip(outputs, tried, strict=True) if own == ordinary]
-    places = _places(fleet, usual, names)
-    return tuple(_learnt(fleet, STRUCTURES[name], np.stack(own)) for name, own in places.items())
+    source, longest = prepare_input(fleet.u, fleet.natural), longest_lag(fleet.u.size)
+    problems = [Problem(source=source, y=y, valid=None, longest_delay=longest + 2.0) for y in usual]
+    rough = rough_response(fleet.u, usual[0], longest_delay=longest)
+    first = fit_plain(problems[0], rough, (fleet.structure.name, *names))
+    starts = {fit.structure.name: fit.theta for fit in first}
+    found = []
+    for name in names:
+        structure = STRUCTURES[name]
+        own = [fit_structure(problems[0], structure, starts[name]).theta]
+        own += [fit_structure(problem, structure, own[0]).theta for problem in problems[1:]]
+        low, high = box_around(np.stack(own), np.array(_LEAST[: own[0].size]))
+        places = places_in(low, high, _DEGREE)
+        basis, values = in_basis(answers(source, structure, places))
+        surface = Surface.fitted(low, high, places, values, degree=_DEGREE)
+        found.append(Simpler(structure=structure, basis=basis, surface=surface))
+    return tuple(found)
 
 
-def _places(
-    fleet: Fleet, outputs: Sequence[Real], names: tuple[StructureName, ...]
-) -> dict[StructureName, list[Real]]:
-    """Where the fit of each structure ends for each output; units are alike, so the first helps."""
-    source, n = prepare_input(fleet.u, fleet.natural), fleet.u.size
-    longest = longest_lag(n)
-    problems = [
-        Problem(source=source, y=y, valid=None, longest_delay=longest + 2.0) for y in outputs
-    ]
-    rough = rough_response(fleet.u, outputs[0], longest_delay=longest)
-    starts = {
-        fit.structure.name: fit.theta
-        for fit in fit_plain(problems[0], rough, (fleet.structure.name, *names))
-    }
-    found: dict[StructureName, list[Real]] = {name: [] for name in names}
-    for problem in problems:
-        for name, ends in found.items():
-            start = ends[0] if ends else starts[name]
-            ends.append(fit_structure(problem, STRUCTURES[name], start).theta)
-    return found
+def costs_of(simpler: Simpler, centred: Real, power: Real) -> Real:
+    """Least residual sum of squares of a simpler structure for each output, shape (k,).
 
-
-def _learnt(fleet: Fleet, structure: Structure, found: Real) -> Simpler:
-    low, high = box_around(found, np.array(_LEAST[: found.shape[1]]))
-    places = places_in(low, high, _DEGREE)
-    source = prepare_input(fleet.u, fleet.natural)
-    basis, values = in_basis(answers(source, structure, places))
-    surface = Surface.fitted(low, high, places, values, degree=_DEGREE)
-    return Simpler(structure=structure, basis=basis, surface=surface)
-
-
-def costs_of(fleet: Fleet, one: Simpler, centred: Real, power: Real) -> Real:
-    """Least sum of squares that a simpler structure leaves of each output, shape (k,).
-
-    Of outputs less their means, (k, n), and of their sums of squares, (k,).
+    Given are outputs less their means, (k, n), and their sums of squares, (k,).
     """
-    z = centred @ one.basis.T
+    z, surface = centred @ simpler.basis.T, simpler.surface
     outside = np.maximum(power - np.vecdot(z, z), 0.0)
-    surface = one.surface
     start = np.tile((surface.low + surface.high) / 2, (z.shape[0], 1))
-    theta = descended(surface, z, outside, start, samples=fleet.u.size)
+    theta = descended(surface, z, outside, start, samples=centred.shape[1])
     g = surface.values(theta)[:, :-1]
-    taken = np.vecdot(z, g) ** 2 / np.vecdot(g, g)
-    return np.asarray(np.maximum(power - taken, 0.0))
+    explained = np.vecdot(z, g) ** 2 / np.vecdot(g, g)
+    return np.asarray(np.maximum(power - explained, 0.0))

@@ -1,8 +1,8 @@
 """Smooth functions on a box as polynomials: evaluated for many points at once, with slopes.
 
-A function of a few parameters that is dear to evaluate is sampled once over a box, and its
-polynomial of Chebyshev products of one total degree is evaluated instead. How far that is off is
-measured at points that took no part in the fit.
+A function of a few parameters that is expensive to evaluate is sampled once over a box, and a
+polynomial of Chebyshev products of one total degree is evaluated instead. Its error is measured at
+points that took no part in the fit.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ __all__ = ["Surface", "places_in"]
 
 
 _FEWEST_SPARE = 10
-"""Points of the fit beyond the coefficients: as many as these, or so many. With half as many a
-wide box is held twice as badly; with more it is held no better."""
+"""Least number of points of the fit beyond the coefficients; else as many as those. With half as
+many the error in a wide box is twice as large; with more it is no smaller."""
 
 _CHECKS = 40
 """Points at which the error is measured."""
@@ -29,8 +29,8 @@ _CHECKS = 40
 def places_in(low: Real, high: Real, degree: int) -> Real:
     """Points, (m, p), of a box at which to sample a function, dense towards its faces.
 
-    The degree is the total one of the polynomial that is to be fitted. They are always the same,
-    those of a lower degree first; the last 40 are for the error.
+    The degree is the total degree of the polynomial. The points are always the same, those of a
+    lower degree first; the last 40 are for the error.
     """
     size = len(_powers(low.size, degree))
     count = size + max(size, _FEWEST_SPARE) + _CHECKS
@@ -40,23 +40,22 @@ def places_in(low: Real, high: Real, degree: int) -> Real:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surface:
-    """A function on a box, with values of k numbers.
+    """A function on a box, with k values.
 
     Examples
     --------
     >>> low, high = np.array([1.0, 0.0]), np.array([2.0, 0.5])
     >>> at = places_in(low, high, 8)
-    >>> told = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
-    >>> value, slope = told.at(np.array([[1.5, 0.2]]))
-    >>> bool(abs(value[0, 0] - np.exp(0.3)) < told.error[0]), bool(told.error[0] < 1e-6)
+    >>> surface = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
+    >>> value, slope = surface.at(np.array([[1.5, 0.2]]))
+    >>> bool(abs(value[0, 0] - np.exp(0.3)) < surface.error[0]), bool(surface.error[0] < 1e-6)
     (True, True)
     """
 
-    # (p,): the box
-    low: Real
-    high: Real
+    low: Real  # (p,): a corner of the box
+    high: Real  # (p,): the opposite one
     powers: NDArray[np.int64]  # (c, p): degrees of each product of Chebyshev polynomials
-    weights: Real  # (c, k): their factors
+    weights: Real  # (c, k): their coefficients
     error: Real  # (k,): largest error at points that took no part in the fit
 
     @classmethod
@@ -106,7 +105,7 @@ def _products(x: Real, powers: NDArray[np.int64]) -> tuple[Real, Real]:
 
 
 def _multiplied(each: Real, powers: NDArray[np.int64]) -> Real:
-    """Products, (n, c), of what each variable has at each degree, (n, p, degrees)."""
+    """Products, (n, c), of the polynomials of each variable, (n, p, degrees)."""
     out = each[:, 0, powers[:, 0]]
     for j in range(1, powers.shape[1]):
         out *= each[:, j, powers[:, j]]

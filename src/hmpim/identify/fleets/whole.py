@@ -1,13 +1,12 @@
-"""Everything that `identify` says, of the records of a fleet of which nothing else is to be said.
+"""The whole result of `identify`, for the records of a fleet that pass every test.
 
-The parameters are those of `fleet.py`; `quiet.py` makes the tests. What is left is read off as
-`hmpim.identify.pair` reads it: the measured response and its bandwidths, the paper's steps, and
-what simpler structures leave. Those are the only candidates there are: a record that asks for
-richer ones is not quiet.
+The parameters come from `fleet.py`, and the tests from `quiet.py`. The rest is read as in
+`hmpim.identify.pair`: the measured response and its bandwidths, the paper's steps, and the
+candidates. These are the simpler structures alone: a record that needs a richer one fails a test.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from hmpim.identify.fleets.fleet import (
     widen,
 )
 from hmpim.identify.fleets.learnt import is_alike, theta_at
-from hmpim.identify.fleets.pole import alone_of, joint_of
+from hmpim.identify.fleets.pole import alone_of
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
 from hmpim.identify.frf.local import local_responses
@@ -40,12 +39,8 @@ from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.reading.spanned import spanned
-from hmpim.identify.result import (
-    Candidate,
-    Nonlinearity,
-    PairIdentification,
-    Parameters,
-)
+from hmpim.identify.result import Candidate, Nonlinearity, PairIdentification, Parameters
+from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
 from hmpim.model import RationalDelay
@@ -54,17 +49,17 @@ from hmpim.record import Finding
 __all__ = ["Whole", "learn_whole", "whole_pairs"]
 
 _LONGEST = 32768
-"""Samples of a record that `identify` looks at one by one."""
+"""Greatest number of samples that `identify` uses one by one."""
 
 _SPARE = 6
-"""Figures that the lines of a stimulus must tell: four of a second-order model, and two more."""
+"""Figures that the lines of a stimulus must determine: four of a second-order model, and two."""
 
 _APART = 0.05
-"""Standard deviations by which a figure of a unit that was learnt from may be off."""
+"""Greatest error, in standard deviations, of a figure of a unit that was learnt from."""
 
 _ASKED = 0.5 * (np.sqrt(2.0 * CLEARLY) - 0.5) ** 2
-"""Log-likelihood half a deviation below CLEARLY, from which a record is asked for a nonlinearity:
-what one leaves of the unit in the middle is not quite what it leaves of each."""
+"""Log-likelihood half a deviation below CLEARLY, from which a record is tested for a nonlinearity:
+the residual that it causes in the unit in the middle is not quite that in each unit."""
 
 _BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
@@ -73,19 +68,19 @@ _NOTHING = Nonlinearity(share=0.0, even=0.0, odd=0.0, noise=1.0, linear=0.0, non
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Whole:
-    """What the records of a fleet share beyond their parameters."""
+    """Common properties of the records of a fleet, for whole results."""
 
-    fleet: Fleet  # the parameters' part
-    simpler: tuple[Simpler, ...]  # structures that are weighed against that of the fleet
+    fleet: Fleet  # for the parameters
+    simpler: tuple[Simpler, ...]  # structures that are compared with that of the fleet
     sweep: SweepPhase | None  # the stimulus' phase, if it is a sweep
-    shapes: Real  # (m, n): what nonlinearities leave of the unit in the middle
+    shapes: Real  # (m, n): residuals that nonlinearities cause in the unit in the middle
 
 
 def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | None:
-    """Learn from some units what everything takes; None where each must be asked by itself.
+    """Learn the properties for whole results; None if each record must be identified by itself.
 
-    What is learnt is held against what it is learnt from, `pairs` of `identify`: where anything is
-    said of these units that `identify` did not say, nothing is learnt.
+    They are checked on the units that they are learnt from, `pairs` of `identify`: if any result
+    differs, nothing is learnt.
     """
     u, fs = fleet.u, fleet.fs
     sweep = sweep_phase(u, fs)
@@ -95,7 +90,11 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     if 2 * lines_of(u).count < _SPARE or (noise is not None and noise.attenuation > WORTH):
         return None
     known = [pair for pair in pairs if is_alike(pair)]
-    outputs = [output for pair in known if (output := _output(pair)) is not None]
+    outputs = [
+        pair.prediction + pair.residual
+        for pair in known
+        if pair.prediction is not None and pair.residual is not None
+    ]
     if not known or len(outputs) < len(known):
         return None
     simpler = learn_simpler(fleet, known, outputs)
@@ -104,29 +103,21 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     whole = Whole(fleet=fleet, simpler=simpler, sweep=sweep, shapes=_shapes_of(fleet))
     every = np.stack(outputs)
     again = whole_pairs(whole, fit_fleet(fleet, every), every)
-    told = [_is_said(own, pair) for own, pair in zip(again, known, strict=True) if own is not None]
-    return whole if all(told) and 2 * len(told) >= len(known) else None
+    same = [_agrees(own, pair) for own, pair in zip(again, known, strict=True) if own is not None]
+    return whole if all(same) and 2 * len(same) >= len(known) else None
 
 
-def _output(pair: PairIdentification) -> Real | None:
-    if pair.prediction is None or pair.residual is None:
-        return None
-    return np.asarray(pair.prediction + pair.residual)
-
-
-def _is_said(own: PairIdentification, pair: PairIdentification) -> bool:
-    """Whether what all together say of a unit is what was said of it alone."""
-    if own.intersample != pair.intersample or own.verdict != pair.verdict:
+def _agrees(together: PairIdentification, alone: PairIdentification) -> bool:
+    """Whether a unit has the same result in the fleet as alone."""
+    if together.intersample != alone.intersample or together.verdict != alone.verdict:
         return False
-    if not {w.code for w in pair.warnings} >= {w.code for w in own.warnings}:
+    if not {w.code for w in alone.warnings} >= {w.code for w in together.warnings}:
         return False
-    for name in (field.name for field in fields(Parameters)):
-        one, other = getattr(own.parameters, name), getattr(pair.parameters, name)
-        if (one is None) != (other is None):
+    for name in EVERY:
+        here, there = getattr(together.parameters, name), getattr(alone.parameters, name)
+        if (here is None) != (there is None):
             return False
-        if one is None or other is None:
-            continue
-        if abs(one.value - other.value) > _APART * other.spread:
+        if here is not None and abs(here.value - there.value) > _APART * there.spread:
             return False
     return True
 
@@ -139,21 +130,22 @@ def whole_pairs(
     names: tuple[str, str] = ("u", "y"),
     findings: tuple[Finding, ...] = (),
 ) -> list[PairIdentification | None]:
-    """Everything that `identify` says of many records; None for those that it must be asked for.
+    """Return the results of `identify` for many records; None for those that are left to it.
 
-    Outputs have shape (N, n); names are those of input and output; `findings` are what is said of
-    the stimulus and the clock.
+    Outputs have shape (N, n); `names` are those of input and output; `findings` are about the
+    stimulus and the clock.
     """
-    fleet, count = whole.fleet, outputs.shape[1]
+    fleet = whole.fleet
     centred = outputs - outputs.mean(axis=1, keepdims=True)
     power = np.vecdot(centred, centred)
-    simpler = np.stack([costs_of(fleet, one, centred, power) for one in whole.simpler], axis=1)
+    simpler = np.stack([costs_of(each, centred, power) for each in whole.simpler], axis=1)
     found: list[PairIdentification | None] = [None] * outputs.shape[0]
     bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
     columns = {name: column.copy() for name, column in fit.columns.items()}
     for group in fit.groups:
-        behind, some = simpler[group.some], group.some
-        quiet = are_quiet(fleet, group, outputs[some], behind=behind, sweep=whole.sweep)
+        some = group.some
+        costs = simpler[some]
+        quiet = are_quiet(fleet, group, outputs[some], simpler=costs, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
         measured = outputs[some[places]]
         covered = _cover_bends(fleet, group, places, measured, shapes=whole.shapes, columns=columns)
@@ -168,7 +160,8 @@ def whole_pairs(
         papers = estimates_of_many(fleet.u, measured, fleet.fs, fleet.band)
         for k, response, paper in zip(places.tolist(), responses, papers, strict=True):
             i = int(some[k])
-            system = _system(fleet, group, k)
+            vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
+            system = system_of(fleet.structure, vector, fleet.fs)
             own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
             crossings = response_bandwidths(
                 response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
@@ -188,8 +181,8 @@ def whole_pairs(
                 frequency_response=response,
                 numerator=(1.0,),
                 denominator=(*system.denominator[::-1].tolist(),),
-                candidates=_candidates(whole, fit, group, k, behind[k], float(power[i])),
-                warnings=(*findings, *_findings(fleet, group, k, own, count)),
+                candidates=_candidates(whole, group, k, costs[k], float(power[i])),
+                warnings=(*findings, *_findings(fleet, group, k, own)),
                 from_response=crossings,
                 nonlinearity=_NOTHING,
                 covariance=_covariance(fleet, group, k, system),
@@ -199,13 +192,14 @@ def whole_pairs(
 
 
 def _shapes_of(fleet: Fleet) -> Real:
-    """Return what nonlinearities leave of the unit in the middle of a fleet, shape (m, n)."""
-    usual = (one for one in fleet.members if one.intersample == fleet.natural)
+    """Residuals that nonlinearities cause in the unit in the middle of a fleet, shape (m, n)."""
+    usual = (member for member in fleet.members if member.intersample == fleet.natural)
     member = next(usual, fleet.members[0])
     place = (member.surface.low + member.surface.high) / 2
     values = member.surface.values(place[None])[0]
-    problem, best = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
-    return bent_shapes(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+    alone = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
+    mode, fit = member.intersample, alone.best.fit
+    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
 
 
 def _cover_bends(
@@ -217,16 +211,15 @@ def _cover_bends(
     shapes: Real,
     columns: dict[str, Column],
 ) -> Mask:
-    """Let intervals cover a nonlinearity that may be there; return where no more is to be said.
+    """Let intervals cover a nonlinearity that is possible; return which records need no more.
 
-    Units of a fleet are much alike, and so is what a nonlinearity leaves of them. So all residuals
-    are held against what each kind leaves of the unit in the middle, and only where one takes
-    nearly enough is the record asked by itself, by `hmpim.identify.nonlinear.bends`.
+    Units of a fleet are much alike, and so are the residuals that a nonlinearity causes. So all
+    residuals are compared with those of each kind in the unit in the middle, (m, n), and only where
+    one explains nearly enough is the record tested by itself, by `hmpim.identify.nonlinear.bends`.
 
-    Of `some` k records of the group, with outputs (k, n), and `shapes`, (m, n), from `shapes_of`.
-    What is widened is written to `columns`, which are of all records. False where a nonlinearity
-    brings more than chance would, or comes beside one more pole or zero: such a record is for
-    `identify`.
+    Given are `some` k records of the group with their outputs, (k, n). The wider intervals are
+    written to `columns`, which hold all records. False where a nonlinearity explains more than
+    chance would, or occurs together with one more pole or zero: `identify` decides.
     """
     member = group.fit.member
     found = group.residual[some] @ shapes.T / np.sqrt(group.errors.variance[some, None])
@@ -234,33 +227,21 @@ def _cover_bends(
     covered = np.ones(some.size, dtype=bool)
     for k in np.flatnonzero(gains > _ASKED).tolist():
         i, j = int(some[k]), int(group.some[some[k]])
-        problem, best = alone_of(fleet, member, group.fit.theta[j], outputs[k])
-        bent = bends(fleet.u, problem, best.fit, intersample=member.intersample, fs=fleet.fs)
+        alone = alone_of(fleet, member, group.fit.theta[j], outputs[k])
+        mode, fit = member.intersample, alone.best.fit
+        bent = bends(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
         if not bent:
             continue
         covered[k] = not bent[0].certain and not group.has_tail(i)
         if covered[k]:
-            own = parameters_of(group.alone, i)
-            wide = spanned(
-                own,
-                joint_of(problem, best),
-                fs=fleet.fs,
-                highest=fleet.highest,
-                bent=[(one.fit, one.farthest) for one in bent],
-            )
+            own, moved = parameters_of(group.alone, i), [(each.fit, each.farthest) for each in bent]
+            wide = spanned(own, alone, fs=fleet.fs, highest=fleet.highest, bent=moved)
             widen(columns, j, own, wide)
     return covered
 
 
-def _system(fleet: Fleet, group: Group, k: int) -> RationalDelay:
-    """The model of one record, in s."""
-    i = int(group.some[k])
-    vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
-    return system_of(fleet.structure, vector, fleet.fs)
-
-
 def _covariance(fleet: Fleet, group: Group, k: int, system: RationalDelay) -> Real:
-    """Of delay, scale factor, and the denominator's coefficients, highest power first."""
+    """Covariance of delay, scale factor, and denominator, highest power first."""
     _, first, second = system.denominator
     slopes = np.array(
         [
@@ -275,18 +256,18 @@ def _covariance(fleet: Fleet, group: Group, k: int, system: RationalDelay) -> Re
 
 
 def _candidates(
-    whole: Whole, fit: FleetFit, group: Group, k: int, behind: Real, power: float
+    whole: Whole, group: Group, k: int, costs: Real, power: float
 ) -> tuple[Candidate, ...]:
     """All structures that were tried, the likeliest first."""
     fleet, i = whole.fleet, int(group.some[k])
     n = fleet.u.size
     tried = [
-        (fleet.structure, one.member.intersample, float(one.cost[i]), one is group.fit)
-        for one in (group.fit, *(other for other, _ in group.others))
+        (fleet.structure, fits.member.intersample, float(fits.cost[i]), fits is group.fit)
+        for fits in (group.fit, *(other for other, _ in group.others))
     ]
     tried += [
-        (one.structure, fleet.natural, float(cost), False)
-        for one, cost in zip(whole.simpler, behind, strict=True)
+        (simpler.structure, fleet.natural, float(cost), False)
+        for simpler, cost in zip(whole.simpler, costs, strict=True)
     ]
     found = [
         Candidate(
@@ -301,8 +282,8 @@ def _candidates(
     return tuple(sorted(found, key=lambda c: c.criterion))
 
 
-def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tuple[Finding, ...]:
-    """What is said of a quiet record: what it cannot tell, which its intervals cover."""
+def _findings(fleet: Fleet, group: Group, k: int, own: Parameters) -> tuple[Finding, ...]:
+    """Findings on a quiet record: figures beyond its band, and models that its intervals cover."""
     i = int(group.some[k])
     found: list[Finding] = []
     missing = [name for name in _BANDWIDTHS if getattr(own, name) is None]
@@ -312,12 +293,10 @@ def _findings(fleet: Fleet, group: Group, k: int, own: Parameters, n: int) -> tu
     if delay is not None:
         poles = fleet.structure.order + 1
         found.append(barely_distinguished(fleet.structure.name, poles=poles, delay=delay))
-    rivals = sorted(
-        (float(other.cost[i]), other) for other, stays in group.others if bool(stays[k])
-    )
+    rivals = sorted((float(fits.cost[i]), fits) for fits, possible in group.others if possible[k])
     apart = [
-        (other.member.intersample, float(other.theta[i, 0] - group.fit.theta[i, 0]), "")
-        for _, other in rivals
+        (fits.member.intersample, float(fits.theta[i, 0] - group.fit.theta[i, 0]), "")
+        for _, fits in rivals
     ]
     found += undetermined_between(group.fit.member.intersample, apart)
     return tuple(found)

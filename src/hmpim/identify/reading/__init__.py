@@ -1,10 +1,10 @@
 """Figures read off a fitted model, each with its error bar.
 
-readings          every parameter of a fit, and the covariance behind it
-figures           what a vector of fitted parameters stands for, with its errors
-propagation       how that covariance carries over to what is read off
-coefficients      of a system, as results have them
+readings          every parameter of a fit, and their covariance
+figures           figures of a vector of fitted parameters, with their errors
+propagation       propagation of the covariance to figures
+coefficients      coefficients of a system, as in results
 spanned           intervals that cover every model that the record allows
-bandwidth         bandwidths of the measured response, beside the model's
-sampled_response  what a response is from samples to samples
+bandwidth         bandwidths of the measured response, compared with the model's
+sampled_response  the response from samples to samples
 """

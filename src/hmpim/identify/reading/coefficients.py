@@ -1,4 +1,4 @@
-"""A system's coefficients as results have them: highest power first, of unit gain."""
+"""Coefficients of a system as in results: highest power first, with unit gain."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ __all__ = ["coefficients_of", "highest_first"]
 
 
 def coefficients_of(system: RationalDelay) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Numerator and denominator of unit gain, highest power first: of s, or of software's z.
+    """Numerator and denominator of unit gain, highest power first: of s, or of z for software.
 
-    Below, the coefficient 1 is that of s⁰, or that of the highest power of z.
+    The denominator has a coefficient of 1 at s⁰, or at the highest power of z.
 
     Examples
     --------
@@ -34,8 +34,7 @@ def coefficients_of(system: RationalDelay) -> tuple[tuple[float, ...], tuple[flo
 def highest_first(covariance: Real, system: RationalDelay) -> Real | None:
     """Covariance of delay, numerator and denominator, (q, q), by falling powers instead of rising.
 
-    None where it is not finite, as the record does not see a direction.
+    None where it is not finite, because the record does not determine every parameter.
     """
-    if not np.isfinite(covariance).all():
-        return None
-    return by_falling_powers(covariance, system.numerator.size)
+    finite = np.isfinite(covariance).all()
+    return by_falling_powers(covariance, system.numerator.size) if finite else None

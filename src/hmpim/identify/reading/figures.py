@@ -42,21 +42,18 @@ def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
 
 
 def system_of(structure: Structure, vector: Real, fs: float) -> RationalDelay:
-    """Build the system in seconds that a fit's vector stands for."""
-    order = structure.order
+    """Return the system in seconds for the vector of a fit."""
+    order, delay = structure.order, float(vector[0]) / fs
+    coefficients, above = coefficients_of(structure, vector[1 : 1 + order]), vector[1 + order : -1]
     if structure.sampled:
-        above, below = in_delta(
-            structure, coefficients_of(structure, vector[1 : 1 + order]), vector[1 + order : -1]
-        )
+        numerator, denominator = in_delta(structure, coefficients, above)
         return RationalDelay(
-            delay=float(vector[0]) / fs, numerator=above, denominator=below, step=1.0 / fs
+            delay=delay, numerator=numerator, denominator=denominator, step=1.0 / fs
         )
-    coefficients = coefficients_of(structure, vector[1 : 1 + order])
     denominator = denominator_of(structure, coefficients)
-    told = vector[1 + order : -1] * fs**structure.integrators
-    numerator = numerator_of(structure, coefficients, told)
+    numerator = numerator_of(structure, coefficients, above * fs**structure.integrators)
     return RationalDelay(
-        delay=float(vector[0]) / fs,
+        delay=delay,
         numerator=numerator / fs ** np.arange(numerator.size),
         denominator=denominator / fs ** (np.arange(denominator.size) - structure.integrators),
     )
@@ -73,7 +70,7 @@ def read_figures(
     noise: Estimate,
     units: tuple[str, str],
 ) -> tuple[Parameters, RationalDelay, Real]:
-    """Turn a fit's parameters, `vector` as `Readings` has it, and their covariance into estimates.
+    """Turn the parameters of a fit, `vector` as in `Readings`, and their covariance into estimates.
 
     Parameters
     ----------
@@ -81,6 +78,8 @@ def read_figures(
         As for `read_parameters`; nothing is read off the response if `highest` is None.
     effective : float
         Independent samples less parameters.
+    noise : Estimate
+        Standard deviation of the noise.
     units : (str, str)
         Of input and output.
 
@@ -95,7 +94,14 @@ def read_figures(
     """
     system = system_of(structure, vector, fs)
     values, peak = _values(structure, vector, system, fs=fs, highest=highest)
-    by_coefficient = _by_coefficient(structure, vector, fs)
+
+    def coefficients(at: Real) -> Real:
+        """The delay and the coefficients of B and A in s; the first of A that is not 0 is 1."""
+        other = system_of(structure, at, fs)
+        varied = other.denominator[structure.integrators + 1 :]
+        return np.concatenate([[other.delay], other.numerator, varied])
+
+    by_coefficient = gradient(coefficients, vector)  # (p, q)
     slopes = _slopes(structure, vector, fs, values)
     slopes |= _slopes_of_marks(structure, system, by_coefficient, values, peak)
     unit_of = units_of(structure, units)
@@ -112,7 +118,7 @@ def read_figures(
 def _slopes(
     structure: Structure, vector: Real, fs: float, values: dict[str, float | None]
 ) -> dict[str, Real]:
-    """Derivatives with respect to the fit's vector of what is no mark of the response."""
+    """Derivatives by the vector of the fit, of figures that do not come from the response."""
     axis, order = np.eye(vector.size), structure.order
     slopes = {
         "delay": axis[0] / fs,
@@ -132,7 +138,7 @@ def _slopes(
 
 
 def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:
-    """Values alone of what `read_parameters` gives with error bars, the noise apart."""
+    """Values of the figures that `read_parameters` gives with error bars, without the noise."""
     vector = np.concatenate([fit.theta, fit.linear])
     return figures_at(fit.structure, vector, fs=fs, highest=highest)
 
@@ -140,23 +146,23 @@ def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None
 def figures_at(
     structure: Structure, vector: Real, *, fs: float, highest: float
 ) -> dict[str, float | None]:
-    """The same at any parameters, `vector` as `Readings` has it."""
+    """The same at any parameters, `vector` as in `Readings`."""
     return _values(structure, vector, system_of(structure, vector, fs), fs=fs, highest=highest)[0]
 
 
 def _values(
     structure: Structure, vector: Real, system: RationalDelay, *, fs: float, highest: float | None
 ) -> tuple[dict[str, float | None], PeakGain | None]:
-    """Every figure of a system but the noise; the peak of its gain."""
+    """Every figure of a system except the noise; the peak of its gain."""
     mode, steady = _lowest_mode(structure, vector), _is_steady(structure)
-    natural = damping = late = split = half = peak = None
+    natural = damping = phase90 = without_delay = half = peak = None
     if mode is not None:  # 1 + c1 s + c2 s²: c2^(-1/2), c1 ω / 2; the vector holds c2 / c1²
         damping = 0.5 / float(np.sqrt(vector[mode + 1]))
         natural = 2 * damping * float(np.exp(-vector[mode])) * fs / (2 * np.pi)
     if steady and highest is not None:
-        late = bandwidth_phase(system, highest=highest)
+        phase90 = bandwidth_phase(system, highest=highest)
         if structure.order:
-            split = bandwidth_phase(system, highest=highest, delay=False)
+            without_delay = bandwidth_phase(system, highest=highest, delay=False)
             half = bandwidth_3db(system, highest=highest)
             peak = peak_gain(system, highest=highest)
     values = {
@@ -167,8 +173,8 @@ def _values(
         "natural_frequency": natural,
         "damping_ratio": damping,
         "time_constant": dominant_time_constant(system),
-        "bandwidth_phase90": late,
-        "bandwidth_phase90_without_delay": split,
+        "bandwidth_phase90": phase90,
+        "bandwidth_phase90_without_delay": without_delay,
         "bandwidth_3db": half,
         "peak_gain_db": None if peak is None else peak.gain_db,
     }
@@ -176,35 +182,21 @@ def _values(
 
 
 def _is_steady(structure: Structure) -> bool:
-    """Whether there is a gain at DC to compare with: an integrator and a washout have none."""
+    """Whether there is a gain at DC: an integrator and a washout have none."""
     return structure.integrators == 0 and structure.dc_zeros == 0
 
 
 def _gain_rate(structure: Structure, fs: float) -> float:
-    """Scale factor in seconds over that in samples."""
+    """Ratio of the scale factor in seconds to that in samples."""
     return float(fs ** (structure.integrators - structure.dc_zeros))
 
 
 def _slope_at_dc(system: RationalDelay) -> float:
-    """Delay that the phase shows at low frequency, in s."""
+    """Delay at low frequency, by the slope of the phase, in s."""
     first = 0.0 if system.denominator.size < 2 else float(system.denominator[1])
     above = system.numerator
     lead = above[1] / above[0] if above.size > 1 and above[0] else 0.0
     return float(system.delay + (first - lead) * (system.step or 1.0))
-
-
-def _by_coefficient(structure: Structure, vector: Real, fs: float) -> Real:
-    """Derivatives of the delay and the coefficients of B and A in s by a fit's vector, (p, q).
-
-    Of the coefficients of A those behind the first that is not zero, which may vary.
-    """
-
-    def coefficients(at: Real) -> Real:
-        system = system_of(structure, at, fs)
-        varied = system.denominator[structure.integrators + 1 :]
-        return np.concatenate([[system.delay], system.numerator, varied])
-
-    return gradient(coefficients, vector)
 
 
 def _slopes_of_marks(
@@ -214,9 +206,9 @@ def _slopes_of_marks(
     values: dict[str, float | None],
     peak: PeakGain | None,
 ) -> dict[str, Real]:
-    """Derivatives of the marks of the response with respect to the fit's vector, each shape (p,).
+    """Derivatives by the vector of the fit, (p,), of figures that come from the response.
 
-    A crossing's by the implicit function: the curve's own error over its slope.
+    For a crossing by the implicit function: the change of the curve over its slope.
     """
 
     def at(frequency: float) -> tuple[Complex, complex]:
@@ -225,8 +217,8 @@ def _slopes_of_marks(
         below, here, above = response(system, places)
         rate = (above - below) / ((places[2] - places[0]) * here)
         by_delay, by_above, by_below = log_slopes(system, places[1:2])
-        told = structure.dc_zeros
-        by_above[told] -= 1.0 / system.numerator[told]
+        first = structure.dc_zeros
+        by_above[first] -= 1.0 / system.numerator[first]
         change = by_coefficient @ np.concatenate([by_delay, by_above, by_below])[:, 0]
         return change, complex(rate)
 
@@ -241,14 +233,14 @@ def _slopes_of_marks(
         change, rate = at(value)
         slopes["bandwidth_3db"] = change.real / rate.real
     if peak is not None:
-        slopes["peak_gain_db"] = np.zeros(delay.size)  # 0 dB, where there is no hump
-        if peak.frequency > 0.0:  # at a maximum the frequency's own shift does not count
+        slopes["peak_gain_db"] = np.zeros(delay.size)  # 0 dB, if there is no hump
+        if peak.frequency > 0.0:  # at a maximum a shift of its frequency has no effect
             slopes["peak_gain_db"] = 20 / np.log(10) * at(peak.frequency)[0].real
     return slopes
 
 
 def _late_at_dc(structure: Structure, system: RationalDelay, slopes: Real) -> Real:
-    """Derivative of what the dynamics add to the delay at low frequency, in s, shape (p,)."""
+    """Derivative of the delay of the dynamics at low frequency, in s, shape (p,)."""
     above, late = system.numerator, np.zeros(slopes.shape[0])
     if not _is_steady(structure):
         return late

@@ -1,8 +1,4 @@
-"""Error bars: how the covariance of a fit carries over to what is read off it.
-
-What follows from the parameters gets its error by first-order propagation, implicit where it is
-the root of an equation.
-"""
+"""Error bars: first-order propagation of the covariance of a fit to figures."""
 
 from collections.abc import Callable
 
@@ -29,7 +25,7 @@ def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Re
     """Standard deviation of a model's response, sqrt(E|error|²), at each frequency in Hz, (m,).
 
     To first order, in the response's unit. The covariance, (q, q), is that of its delay, its
-    numerator, and its denominator behind the first coefficient that is not zero, by rising powers.
+    numerator, and its denominator after the first coefficient that is not zero, by rising powers.
 
     Examples
     --------
@@ -47,12 +43,8 @@ def response_std(system: RationalDelay, covariance: Real, frequency: Real) -> Re
 def log_slopes(system: RationalDelay, frequency: Real) -> tuple[Complex, Complex, Complex]:
     """Derivatives of the logarithm of a response, at each frequency in Hz, (m,).
 
-    Returns
-    -------
-    delay : ndarray, shape (1, m)
-    numerator : ndarray, shape (k, m)
-    denominator : ndarray, shape (l, m)
-        By the coefficients behind the first that is not zero.
+    By the delay, (1, m); the numerator, (k, m); and the denominator after its first coefficient
+    that is not zero, (l, m).
     """
     above, below = system.numerator, system.denominator
     powers = system.variable(frequency)[None, :] ** np.arange(max(above.size, below.size))[:, None]

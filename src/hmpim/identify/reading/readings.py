@@ -1,4 +1,4 @@
-"""What is read off a fitted model: each parameter of the result, with its error bar."""
+"""Parameters of the result, read off the fitted model, each with its error bar."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,31 +24,32 @@ __all__ = ["Readings", "from_lag", "read_parameters"]
 
 
 _ROUNDING = 1e-13
-"""Share of the output (r.m.s.) by which rounding may move it, whatever the residual shows."""
+"""Relative error of the output (r.m.s.) by rounding, even if the residual is smaller."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Readings:
-    """The parameters, the system they stand for, and the covariance behind them.
+    """The parameters of a fit, its system, and their covariance.
 
     Parameters
     ----------
+    parameters : Parameters
+        The estimates.
     system : RationalDelay
         In seconds, the scale factor included.
     vector : ndarray, shape (p,)
-        Delay in samples, parameters of the denominator's sections in samples, numerator,
-        bias.
+        Delay and denominator sections, both in samples; numerator; bias.
     covariance : ndarray, shape (p, p)
         Of `vector`.
     white : bool
-        Whether the residual passed for white.
+        Whether the residual is white.
     halves : ndarray, shape (2, p + 1, p + 1)
         Products of the derivatives of the prediction and `innovations` over either half of the
         record, from `hmpim.identify.fitting.fit.products`.
     innovations : ndarray, shape (n,)
         The residual, whitened.
     whitened : bool
-        Whether that passed for white.
+        Whether `innovations` are white.
     coefficient_covariance : ndarray, shape (q, q)
         Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
@@ -88,7 +89,7 @@ def read_parameters(
     delay_correlation : float or None
         The paper's delay (eq. 8), in s.
     known_covariance : ndarray, shape (p, p), optional
-        Of the fit's parameters, where other inputs were fitted with it.
+        Of the fit's parameters, where several inputs were fitted together.
     """
     fit = joint.best.fit
     structure = fit.structure
@@ -141,13 +142,13 @@ def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, wh
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
     whole = fit.structure.sampled or _in_whole_samples(joint)  # its delay is a number of samples
-    told = slice(int(whole), None)
+    free = slice(int(whole), None)
     inner = None
     if white and is_steady(residual):
         power = float(residual @ residual)
-        inner = white_covariance(gram[told, told], power, freedom=freedom)
+        inner = white_covariance(gram[free, free], power, freedom=freedom)
     if inner is None:
-        rows = jacobian(joint.weighed, fit)[told]
+        rows = jacobian(joint.weighed, fit)[free]
         inner = covariance(rows, residual, freedom=freedom, white=white)
     if not whole:
         return inner
@@ -162,13 +163,13 @@ def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, wh
 
 
 def _in_whole_samples(joint: JointFit) -> bool:
-    """Whether only the sample in which a delay ends is seen: a held input that steps through."""
+    """Whether only the sample in which a delay ends is known: a held input that steps through."""
     structure, held = joint.best.fit.structure, joint.best.intersample == "zoh"
     return held and (structure.name == "static" or steps_through(structure, held=True))
 
 
 def _wandering(cov: Real, residual: Real, counted: int) -> Real:
-    """Widen the bias to noise that rises towards DC below what an autoregression tells."""
+    """Widen the bias for noise that rises towards DC, where an autoregression does not."""
     known = deviation_of_mean(residual, counted) ** 2
     if known <= cov[-1, -1]:
         return cov

@@ -1,7 +1,7 @@
-"""Samples over samples: what a system's response becomes once its input is held or joined.
+"""Response from samples to samples, for an input that is held or linear between its samples.
 
-A ratio of sampled spectra contains what lies between the input's samples, and its aliases: those
-of a first-order lag amount to a percent of the response well below a quarter of the rate.
+A ratio of sampled spectra depends on the input between its samples, and on its aliases: for a
+first-order lag these are a percent of the response well below a quarter of the rate.
 """
 
 from dataclasses import replace
@@ -22,8 +22,8 @@ def sampled_response(
 ) -> Complex:
     """Response from samples of the input to samples of the output, at frequencies in Hz, (m,).
 
-    Held: the modified z-transform, exact, by one matrix exponential for each part of a sample (C.
-    Van Loan, IEEE TAC, 1978). Linear: the integral of a slope that is held.
+    For a held input this is the modified z-transform, exact, by one matrix exponential for each
+    part of a sample (C. Van Loan, IEEE TAC, 1978). A linear input is the integral of a held slope.
 
     Examples
     --------
@@ -44,10 +44,10 @@ def sampled_response(
 
 
 def _held(system: RationalDelay, frequency: Real, fs: float) -> Complex:
-    """Answer a held input, time counted in samples.
+    """Response to a held input, with time in samples.
 
-    Within a sample the delayed input stands at an older sample for the fraction of the delay, and
-    then at the next one.
+    Within a sample the delayed input has an older value for the fraction of the delay, and then the
+    next value.
     """
     whole = np.floor(system.delay * fs + 1e-9)
     late = float(max(system.delay * fs - whole, 0.0))
@@ -67,7 +67,7 @@ def _held(system: RationalDelay, frequency: Real, fs: float) -> Complex:
 
 
 def _stepped(rows: Real, entry: Real, span: float) -> Real:
-    """Transition over a span of the states, with an input that stands still as last state."""
+    """Transition of the states over a span, with a constant input as the last state."""
     order = entry.size
     wide = np.zeros((order + 1, order + 1))
     wide[:order, :order] = rows

@@ -1,10 +1,10 @@
 """Intervals that cover every model that the record does not exclude.
 
-Held, linear and band-limited are three models without a parameter between them. Where the record
-cannot tell them apart and nothing is stated, the figure stays at the likelier one, and its
+Held, linear and band-limited inputs are three models without a parameter between them. Where the
+record cannot distinguish them and none is stated, the figure is that of the likeliest, and its
 interval is the hull of the intervals under each that the likelihood does not exclude (a union of
-confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994). So it is with one more pole that is as
-likely but for its price, or that is slow and would not show.
+confidence sets: R. L. Berger and D. D. Boos, JASA 89, 1994). The same holds for one more pole that
+is as likely except for its price, or that would not show.
 """
 
 from collections.abc import Iterable
@@ -44,15 +44,15 @@ _FAST = (
     *("natural_frequency", "damping_ratio"),
     *("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db"),
 )
-"""Figures that grow beyond all limits as a second pole becomes infinitely fast, bandwidths last."""
+"""Figures that grow without limit as a second pole becomes infinitely fast, bandwidths last."""
 
 
 def rivals_of(joint: JointFit, owed: float = 0.0) -> tuple[Trial, ...]:
     """The likeliest trial under each other assumption that the record does not exclude.
 
-    Of software there is one assumption: then every filter and delay about as likely. `owed` is the
-    share of the best trial's residual that still follows the input: what no model here describes is
-    no noise, and a difference that is smaller excludes nothing.
+    Software has one assumption: there these are all filters and delays that are about as likely.
+    `owed` is the share of the best trial's residual that still follows the input: no model here
+    describes it, it is not noise, and a smaller difference excludes nothing.
     """
     best = joint.best
     if best.fit.structure.sampled:
@@ -72,7 +72,7 @@ def rivals_of(joint: JointFit, owed: float = 0.0) -> tuple[Trial, ...]:
 def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
     """Trials of other structures, with no more parameters, that the record does not exclude.
 
-    Under the chosen assumption. Their price is less, so that the odds are Schwarz's.
+    Only the chosen assumption counts. Their price is no higher, so that the odds are Schwarz's.
     """
     best = joint.best
     if best.fit.structure.sampled:
@@ -90,29 +90,29 @@ def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
 
 
 def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
-    """Plain trials with more parameters that the record asks for by more than chance.
+    """Plain trials under the chosen assumption, with more parameters, better by more than chance.
 
-    Under the chosen assumption, which was taken for their price alone.
+    They were not chosen because of their price alone.
     """
     best = joint.best
     if best.fit.structure.name not in PLAIN:
         return ()
     count = joint.weighed.counted * joint.weighed_share
 
-    def is_asked(trial: Trial) -> bool:
+    def is_better(trial: Trial) -> bool:
         extra = trial.fit.structure.parameters - best.fit.structure.parameters
-        if extra <= 0 or trial.intersample != best.intersample:
+        own = trial.intersample == best.intersample and trial.fit.structure.name in PLAIN
+        if extra <= 0 or not own:
             return False
-        here, there = (max(one.fit.objective, _TINY) for one in (best, trial))
+        here, there = (max(each.fit.objective, _TINY) for each in (best, trial))
         gain = count * (np.log(here) - np.log(there))
-        enough = scipy.special.chdtri(extra, 1.0 - COVERAGE)
-        return trial.fit.structure.name in PLAIN and bool(gain > enough)
+        return bool(gain > scipy.special.chdtri(extra, 1.0 - COVERAGE))
 
-    return tuple(filter(is_asked, joint.trials))
+    return tuple(filter(is_better, joint.trials))
 
 
 def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
-    """Whether another filter or delay may be the true one; more taps than are seen say nothing."""
+    """Whether another filter or delay may be the true one; surplus taps must have an effect."""
     behind = trial.criterion - joint.best.criterion
     extra = trial.fit.structure.parameters - joint.best.fit.structure.parameters
     price = float(np.log(joint.problem.counted * joint.effective_share))
@@ -129,29 +129,27 @@ def spanned(
     others: Iterable[Fit] = (),
     owed: float = 0.0,
 ) -> Parameters:
-    """Widen each interval to what it would be under the other assumptions, or with one more pole.
+    """Widen each interval to cover the other assumptions and one more pole.
 
-    The other fits see the same data with all but the same sensitivity, so that each interval of the
-    best trial's parameters is moved to their value, its width kept. `bent` holds linear fits, and
-    what a nonlinearity that may be there adds to their parameters, (p,); `others` are fits beside a
-    gain that may have changed, or a bias that may have drifted. Beyond `highest`, in Hz, no
+    The other fits have almost the same sensitivity to the data, so that each interval of the best
+    trial's parameters is moved to their value, with its width unchanged. `bent` holds linear fits,
+    each with the change of its parameters, (p,), by a possible nonlinearity; `others` are fits with
+    a gain that may have changed, or a bias that may have drifted. Beyond `highest`, in Hz, no
     bandwidth is read off; `owed` is as for `rivals_of`.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
-        # Of another model a bandwidth may lie beyond the band.
+        # The bandwidth of another model may lie beyond the band.
         return [_or_beyond(figures_of(fit, fs=fs, highest=fs / 2), fit) for fit in fits]
 
     rivals = rivals_of(joint, owed)
     between = figures(trial.fit for trial in rivals)
-    between += figures(fit for one in rivals if _steps_through(one) for fit in _ends(one.fit))
+    between += figures(fit for rival in rivals for fit in _ends(rival))
     richer = figures(
         trial.fit for trial in (*joint.rivals, *plainer_rivals(joint), *asked_rivals(joint))
     )
-    richer += figures(others)
+    richer += figures([*others, *_ends(joint.best)])
     hidden, fit = joint.hidden, joint.best.fit
-    if _steps_through(joint.best):
-        richer += figures(_ends(fit))
     if hidden is not None and (joint.rivals or hidden.may_hide):
         longest = figures_of(as_if_hidden(fit, hidden), fs=fs, highest=highest)
         if set(fit.structure.sections) == {1, 2}:  # the pole joins the real one, and is no mode
@@ -159,11 +157,11 @@ def spanned(
             longest |= {name: room[name] for name in ("natural_frequency", "damping_ratio")}
         richer.append({name: longest[name] for name in (*PHASE_SPLIT, "bandwidth_3db")})
     if hidden is not None and abs(hidden.squared) > HALF * hidden.std and hidden.fit is fit:
-        bent = (*bent, (fit, hidden.squared * hidden.shift))  # more than chance asks for it
+        bent = (*bent, (fit, hidden.squared * hidden.shift))  # more than chance
         proper = fit.structure.zeros < fit.structure.order and not fit.structure.parallel
         if hidden.squared < 0.0 and proper:
             richer += figures([as_if_zero(fit, hidden)])
-    richer += [bent_figures(*one, fs=fs, highest=highest) for one in bent]
+    richer += [bent_figures(*change, fs=fs, highest=highest) for change in bent]
     moved = {}
     for name in EVERY:
         own = getattr(parameters, name)
@@ -179,12 +177,11 @@ def spanned(
     return replace(parameters, **moved)
 
 
-def _steps_through(trial: Trial) -> bool:
-    return steps_through(trial.fit.structure, held=trial.intersample == "zoh")
-
-
-def _ends(fit: Fit) -> list[Fit]:
-    """Fits to the same samples, the delay at either end of the sample that it is in."""
+def _ends(trial: Trial) -> list[Fit]:
+    """Fits with the delay at either end of its sample, if only that sample is known."""
+    fit = trial.fit
+    if not steps_through(fit.structure, held=trial.intersample == "zoh"):
+        return []
     found = at_ends(fit.structure, fit.theta, fit.linear)
     return [replace(fit, theta=theta, linear=linear) for theta, linear in found]
 
@@ -192,7 +189,7 @@ def _ends(fit: Fit) -> list[Fit]:
 def blurred(parameters: Parameters, share: float) -> Parameters:
     """Widen each interval by a share of its figure on either side.
 
-    To so much no linear model is right where a nonlinearity is known to be there.
+    In the presence of a nonlinearity no linear model is more exact.
     """
     moved = {}
     for name in MODELLED:
@@ -208,7 +205,7 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
 
 
 def without_noise(parameters: Parameters, rounding: float = ROUNDING) -> Parameters:
-    """Widen each interval by rounding, and the noise's to 0: the residual need not be noise.
+    """Widen each interval by rounding, and that of the noise to 0: the residual may not be noise.
 
     It may be the error of interpolation between the samples. `rounding` is a share of each figure.
     """
@@ -219,10 +216,10 @@ def without_noise(parameters: Parameters, rounding: float = ROUNDING) -> Paramet
 
 
 def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[str, float | None]:
-    """Figures where a nonlinearity adds so much, (p,), to `theta` and `linear`, to first order.
+    """Figures where a nonlinearity adds `moved`, (p,), to `theta` and `linear`, to first order.
 
-    What a parameter that the record hardly determines takes up leaves a figure that it does alone:
-    the figures' own derivatives along the change say so, and no step as long as the change does.
+    A large change of a parameter that the record hardly determines may leave the figures as they
+    are. Derivatives of the figures along the change show that; a step of its length would not.
     """
     vector, size = np.concatenate([fit.theta, fit.linear]), fit.theta.size
     sides = (
@@ -233,16 +230,16 @@ def bent_figures(fit: Fit, moved: Real, *, fs: float, highest: float) -> dict[st
     here = figures_at(fit.structure, vector, fs=fs, highest=highest)
     there = figures_at(fit.structure, vector + part * moved, fs=fs, highest=highest)
     return {
-        name: None if one is None or other is None else one + (other - one) / part
-        for (name, one), other in zip(here.items(), there.values(), strict=True)
+        name: None if own is None or other is None else own + (other - own) / part
+        for (name, own), other in zip(here.items(), there.values(), strict=True)
     }
 
 
 def _or_beyond(found: dict[str, float | None], fit: Fit) -> dict[str, float | None]:
-    """The figures of a fit, infinite where it has none because what they are of lies beyond.
+    """The figures of a fit, infinite where they are missing because they lie beyond the band.
 
-    A lag alone is a pair of poles of which one is infinitely fast, and no bandwidth is a high one.
-    An integrator and a washout have no gain at DC that a bandwidth could refer to.
+    A single lag is a pair of poles of which one is infinitely fast, and a missing bandwidth is a
+    high one. An integrator and a washout have no gain at DC that a bandwidth could refer to.
     """
     structure = fit.structure
     if structure.integrators or structure.dc_zeros or structure.sampled:
@@ -252,18 +249,18 @@ def _or_beyond(found: dict[str, float | None], fit: Fit) -> dict[str, float | No
 
 
 def _given(found: list[dict[str, float | None]], name: str) -> list[float]:
-    """What each fit says of one figure."""
+    """One figure of each fit that has it."""
     return [float(value) for other in found if (value := other.get(name)) is not None]
 
 
-def _ends_of(one: Estimate) -> tuple[float, float]:
-    """The interval's ends, infinite where it is open."""
-    low, high = one.ci95 or (None, None)
+def _ends_of(own: Estimate) -> tuple[float, float]:
+    """The ends of an interval, infinite where it is open."""
+    low, high = own.ci95 or (None, None)
     return -np.inf if low is None else low, np.inf if high is None else high
 
 
 def _hull(own: Estimate, values: list[float]) -> Estimate:
-    """An interval that holds those around all values; the deviation only where none widens it."""
+    """Widen an interval to contain its copies around all values; then it has no deviation."""
     low, high = own.ci95 or (None, None)
     if low is None or high is None or not values:
         return own

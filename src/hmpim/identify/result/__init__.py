@@ -1,14 +1,16 @@
-"""What an identification says. The ground floor: nothing here imports what makes it.
+"""The result of an identification. Nothing here imports the code that produces it.
 
 digits          numbers for people: the error to its digits, the value to match
 estimate        one figure, its error, its interval, its verdict
+error_bars      estimates from a variance
 plain           results as plain JSON values
 parameters      all figures of one pair; the paper's
-measured        frequency response, bandwidths read off it, what is nonlinear
-inputs          several inputs at once, and how well they are told apart
-pair            all that is known of one input and one output
+groups          groups of parameters that findings name
+measured        frequency response, bandwidths read off it, nonlinearity
+inputs          several inputs at once, and how well they are distinguished
+pair            the result for one input and one output
 lookup          pairs by their names, output first
-powers          coefficients and their covariance, highest power first
+powers          covariances by falling powers
 first_schema    results written by the first version
 identification  the whole result, and its JSON
 """

@@ -14,10 +14,10 @@ _ROUNDING = 1e-10
 """Error over value below which the value's digits are no longer written out to it."""
 
 _ROUGHLY = 0.01
-"""Shorter side of an interval over its longer one to which its digits are written."""
+"""Ratio of an interval's sides down to which the shorter one decides the digits."""
 
 _ONE_DIGIT = 355
-"""First three digits of an error from which one digit of it is enough (Particle Data Group)."""
+"""First three digits of an error from which one digit is enough (Particle Data Group)."""
 
 
 def plus_minus(value: float, std: float, *, short: bool = False) -> str:
@@ -47,20 +47,17 @@ def plus_minus(value: float, std: float, *, short: bool = False) -> str:
     >>> plus_minus(0.9999999999999996, 1.1e-14)  # exact but for rounding
     '1 ± 1e-14'
     """
-    places = _places(std, short=short)
     if 0.0 < std < _ROUNDING * abs(value):
         return f"{value:.10g} ± {std:.0e}"
+    places, exponent = _digits(value, [std], short=short)
     if places is None:
-        return f"{_plain(value)} ± {'0' if std == 0 else '?'}"
-    exponent = _exponent(value, std, places)
-    if exponent:
-        value, std = value / 10.0**exponent, std / 10.0**exponent
-        return f"({_at(value, places + exponent)} ± {_at(std, places + exponent)})e{exponent:+03d}"
-    return f"{_at(value, places)} ± {_at(std, places)}"
+        return f"{value:.6g} ± {'0' if std == 0 else '?'}"
+    number, error = (_at(each / 10.0**exponent, places + exponent) for each in (value, std))
+    return _with_power(f"{number} ± {error}", exponent)
 
 
 def aside(value: float, low: float | None, high: float | None) -> str:
-    """Write a value with how far its interval reaches to either side; None for an open end.
+    """Write a value with the distances to the ends of its interval; None for an open end.
 
     Examples
     --------
@@ -72,7 +69,7 @@ def aside(value: float, low: float | None, high: float | None) -> str:
     '0.15 ± ?'
     >>> aside(3.1e-15, 0.0, 3.4e-15), aside(3.2e9, 3.18e9, None)
     ('(3.10 −3.10 +0.30)e-15', '(3.200 −0.020 +?)e+09')
-    >>> aside(0.15, 0.15 - 2e-12, 0.15 + 2.4e-7)  # one side next to nothing beside the other
+    >>> aside(0.15, 0.15 - 2e-12, 0.15 + 2.4e-7)  # one side much smaller than the other
     '0.1500000000 −0.0000000000 +0.0000002400'
     >>> aside(0.035, 0.035 - 2e-17, 0.035 + 5e-16)  # exact but for rounding
     '0.035 ± 5e-16'
@@ -83,12 +80,11 @@ def aside(value: float, low: float | None, high: float | None) -> str:
         return plus_minus(value, max(known))
     places, exponent = _digits(value, known)
     if places is None:
-        return f"{_plain(value)} ± ?"
+        return f"{value:.6g} ± ?"
     lengths = [None if length is None else length / 10.0**exponent for length in reach]
     places += exponent
     down, up = ("?" if length is None else _at(length, places) for length in lengths)
-    number = f"{_at(value / 10.0**exponent, places)} −{down} +{up}"
-    return f"({number})e{exponent:+03d}" if exponent else number
+    return _with_power(f"{_at(value / 10.0**exponent, places)} −{down} +{up}", exponent)
 
 
 def interval(low: float | None, high: float | None, *, value: float, std: float | None) -> str:
@@ -99,9 +95,9 @@ def interval(low: float | None, high: float | None, *, value: float, std: float 
     low, high : float or None
         The ends; None for an open one.
     value : float
-        What lies between them.
+        The value between them.
     std : float or None
-        Error to whose digits the value is written; None where `aside` writes it.
+        Error that decides the digits of the value; None where `aside` writes it.
 
     Examples
     --------
@@ -120,13 +116,12 @@ def interval(low: float | None, high: float | None, *, value: float, std: float 
     known = [abs(end - value) for end in ends if end != value] if std is None else [std]
     places, exponent = _digits(value, known)
     if places is None or max(known) < _ROUNDING * abs(value):
-        shown, power = [_plain(end) for end in ends], ""
+        shown, exponent = [f"{end:.6g}" for end in ends], 0
     else:
         shown = [_at(end / 10.0**exponent, places + exponent) for end in ends]
-        power = f"e{exponent:+03d}" if exponent else ""
     if len(shown) == 2:
-        both = " to ".join(shown)
-        return f"({both}){power}" if power else both
+        return _with_power(" to ".join(shown), exponent)
+    power = f"e{exponent:+03d}" if exponent else ""
     return f"{shown[0]}{power} or {'less' if low is None else 'more'}"
 
 
@@ -141,29 +136,29 @@ def percent(share: float) -> str:
     return f"{float(f'{100.0 * share:.2g}'):g}"
 
 
-def _places(std: float, *, short: bool = False) -> int | None:
-    """Decimal places that show two digits of `std`, or one; None if it is no positive number."""
+def _digits(
+    value: float, errors: Sequence[float], *, short: bool = False
+) -> tuple[int | None, int]:
+    """Decimal places for two digits of the errors, or one, and the power of ten to factor out.
+
+    There are no places without a positive error, and no power where plain digits are readable.
+    """
+    std = max(min(errors), _ROUGHLY * max(errors)) if errors else 0.0
     if not (math.isfinite(std) and std > 0.0):
-        return None
+        return None, 0
+    places = 1 - int(f"{std:.1e}".partition("e")[2])
     digits, _, exponent = f"{std:.2e}".partition("e")
     if short and _ONE_DIGIT <= int(digits.replace(".", "")) < 950:
-        return -int(exponent)
-    return 1 - int(f"{std:.1e}".partition("e")[2])
-
-
-def _digits(value: float, errors: Sequence[float]) -> tuple[int | None, int]:
-    """Decimal places that show the errors to either side, and the power of ten to take out."""
-    places = _places(max(min(errors), _ROUGHLY * max(errors))) if errors else None
-    return places, 0 if places is None else _exponent(value, max(errors), places)
-
-
-def _exponent(value: float, std: float, places: int) -> int:
-    """Power of ten to take out, 0 where plain digits read well."""
-    largest = max(abs(value), std)
+        places = -int(exponent)
+    largest = max(abs(value), *errors)
     few = places <= _MOST_PLACES or largest >= _SMALLEST_LONG
-    if few and largest < _LARGEST_PLAIN:
-        return 0
-    return math.floor(math.log10(largest)) if math.isfinite(largest) else 0
+    if (few and largest < _LARGEST_PLAIN) or not math.isfinite(largest):
+        return places, 0
+    return places, math.floor(math.log10(largest))
+
+
+def _with_power(text: str, exponent: int) -> str:
+    return f"({text})e{exponent:+03d}" if exponent else text
 
 
 def _at(value: float, places: int) -> str:
@@ -171,7 +166,3 @@ def _at(value: float, places: int) -> str:
         return str(value)
     text = f"{value:.{places}f}" if places >= 0 else f"{round(value, places):.0f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
-
-
-def _plain(value: float) -> str:
-    return f"{value:.6g}"

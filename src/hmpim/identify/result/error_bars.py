@@ -1,4 +1,4 @@
-"""A value with its error bar: Student's t around an estimate, chi-squared around a noise."""
+"""A value with its error bar: Student's t for an estimate, chi-squared for a noise."""
 
 import numpy as np
 import scipy
@@ -11,7 +11,7 @@ __all__ = ["estimate", "noise_estimate"]
 def estimate(value: float, variance: float, *, freedom: float = np.inf, unit: str = "") -> Estimate:
     """Value with its standard deviation and 95 % interval (Student's t).
 
-    The interval is that of a normal error where the variance is known and not itself estimated.
+    The default `freedom` is for a known variance: the interval is that of a normal error.
 
     Examples
     --------
@@ -20,9 +20,8 @@ def estimate(value: float, variance: float, *, freedom: float = np.inf, unit: st
     """
     std = float(np.sqrt(max(variance, 0.0)))
     half = float(scipy.special.stdtrit(max(freedom, 1.0), 0.975)) * std
-    return Estimate(
-        value=float(value), std=std, ci95=(float(value - half), float(value + half)), unit=unit
-    )
+    ends = float(value - half), float(value + half)
+    return Estimate(value=float(value), std=std, ci95=ends, unit=unit)
 
 
 def noise_estimate(
@@ -43,10 +42,7 @@ def noise_estimate(
     """
     sigma = float(np.sqrt(sum_of_squares / freedom))
     effective = max(freedom * share, 1.0)
-    low, high = (
-        float(scipy.special.chdtri(effective, 0.025)),
-        float(scipy.special.chdtri(effective, 0.975)),
-    )
+    low, high = (float(scipy.special.chdtri(effective, tail)) for tail in (0.025, 0.975))
     return Estimate(
         value=sigma,
         std=sigma / float(np.sqrt(2 * effective)),

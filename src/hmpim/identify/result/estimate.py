@@ -8,19 +8,14 @@ from hmpim.identify.chance import HALF
 from hmpim.identify.result.digits import aside, plus_minus
 from hmpim.identify.result.plain import Plain
 
-__all__ = [
-    "Estimate",
-    "Estimates",
-    "ParameterVerdict",
-    "Verdict",
-]
+__all__ = ["Estimate", "Estimates", "ParameterVerdict", "Verdict"]
 
 ParameterVerdict = Literal["ok", "doubtful"]
 Verdict = Literal["ok", "doubtful", "not_identifiable"]
 
 _SEEN = 0.5
-"""Standard deviations by which an interval's sides may differ and be written as one: about what
-rounding an error to one digit hides."""
+"""Greatest difference of an interval's sides that are written as one, in standard deviations: about
+the rounding of an error to one digit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -32,16 +27,16 @@ class Estimate(Plain):
     value : float
         The figure; ``float(estimate)`` gives it.
     std : float or None
-        Standard deviation; None where the interval does not come from a normal error. What is
-        no finite number counts as None. Where the interval is withheld it is what noise alone does
-        to the figure, not how far the figure may be off.
+        Standard deviation; None where the interval does not come from a normal error. A value that
+        is not finite counts as None. Where the interval is withheld it is the effect of noise
+        alone; the error of the figure may be larger.
     ci95 : (float or None, float or None), or None
         95 % interval. It may be asymmetric; an end that is open, or infinite, is None; None for
         an interval that is withheld.
     unit : str
-        Of all of them.
+        Of value, deviation and interval.
     verdict : {'ok', 'doubtful'}
-        Whether to rely on it.
+        Whether the figure is reliable.
 
     Examples
     --------
@@ -69,7 +64,7 @@ class Estimate(Plain):
 
     @property
     def spread(self) -> float:
-        """The standard deviation, or what stands for it: the interval's longer side over 1.96.
+        """The standard deviation or, if there is none, the interval's longer side over 1.96.
 
         Infinite where the interval is open or withheld.
         """
@@ -82,7 +77,7 @@ class Estimate(Plain):
 
     @property
     def asymmetric(self) -> bool:
-        """Whether ``± std`` would misstate the interval, as it reaches farther to one side.
+        """Whether ``± std`` would be wrong because the interval is longer on one side.
 
         False where there is no interval or no standard deviation, or the value lies outside.
 
@@ -131,11 +126,9 @@ class Estimates(Plain):
     __slots__ = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return name to estimate, null where there is no number."""
-        told = super().to_dict()
-        return {
-            n: e if e is not None and math.isfinite(e["value"]) else None for n, e in told.items()
-        }
+        """Return a dictionary from names to estimates, null where a value is not finite."""
+        estimates = super().to_dict().items()
+        return {n: e if e and math.isfinite(e["value"]) else None for n, e in estimates}
 
 
 def _finite(number: float | None) -> float | None:

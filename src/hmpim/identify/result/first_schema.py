@@ -1,4 +1,4 @@
-"""Results that were written by the first version, read as if written now."""
+"""Results that were written by the first version, converted to the present schema."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,8 +16,7 @@ def upgraded(pair: Mapping[str, Any]) -> dict[str, Any]:
     """Return a pair of schema 1 as one of schema 2.
 
     Schema 1 has its covariance by rising powers, and one verdict for the pair. Where that is not
-    ok, nothing says which of its warnings casts the doubt, nor on what: all of them do, on
-    everything.
+    ok, the cause is not recorded: every warning is taken to doubt every parameter.
     """
     trusted = pair["verdict"] == "ok"
 
@@ -27,16 +26,18 @@ def upgraded(pair: Mapping[str, Any]) -> dict[str, Any]:
 
     parameters = judged(pair["parameters"])
     dynamics = pair["dynamics"]
-    nonlinearity = pair.get("nonlinearity")
-    size = None if nonlinearity is None else nonlinearity["size"]
+    covariance, nonlinearity = dynamics.get("covariance"), pair.get("nonlinearity")
+    if covariance is not None:
+        rising = np.asarray(covariance, dtype=np.float64)
+        covariance = by_falling_powers(rising, len(dynamics["numerator"])).tolist()
+    if nonlinearity is not None:
+        nonlinearity = {**nonlinearity, **judged({"size": nonlinearity["size"]})}
     return {
         **pair,
         "parameters": parameters,
-        "dynamics": {**dynamics, "covariance": _falling(dynamics)},
+        "dynamics": {**dynamics, "covariance": covariance},
         "bandwidths_from_response": judged(pair.get("bandwidths_from_response", {})),
-        "nonlinearity": None
-        if nonlinearity is None
-        else {**nonlinearity, "size": judged({"size": size})["size"]},
+        "nonlinearity": nonlinearity,
         "warnings": [
             {
                 "code": warning["code"],
@@ -47,12 +48,3 @@ def upgraded(pair: Mapping[str, Any]) -> dict[str, Any]:
             for warning in pair["warnings"]
         ],
     }
-
-
-def _falling(dynamics: Mapping[str, Any]) -> list[list[float]] | None:
-    covariance = dynamics.get("covariance")
-    if covariance is None:
-        return None
-    rising = np.asarray(covariance, dtype=np.float64)
-    turned: list[list[float]] = by_falling_powers(rising, len(dynamics["numerator"])).tolist()
-    return turned

@@ -1,4 +1,4 @@
-"""Parameters that stand or fall together: what a finding names when it touches more than one."""
+"""Groups of parameters that a finding concerns together."""
 
 from dataclasses import fields
 
@@ -16,10 +16,10 @@ _SEEN = (
     "saturation_high",
     "quantization_step",
 )
-"""Those that are seen in the record itself, whatever the model."""
+"""Parameters that are read off the record itself, whatever the model."""
 
 MODELLED = tuple(name for name in EVERY if name not in _SEEN)
-"""Those that are read off the fitted model, or off what it leaves over."""
+"""Parameters that are read off the fitted model, or off its residual."""
 
 PHASE_SPLIT = (
     "delay",
@@ -28,14 +28,14 @@ PHASE_SPLIT = (
     "time_constant",
     "bandwidth_phase90_without_delay",
 )
-"""Those that depend on how the phase is divided between a delay and poles.
+"""Parameters that depend on how the phase is divided between a delay and poles.
 
-The response within the band is the same either way: so are gain, bandwidths with the delay in
-them, and the slope of the phase at DC.
+The response within the band does not depend on that, nor do gain, bandwidths that include the
+delay, and the slope of the phase at DC.
 """
 
 TIMING = ("delay", "delay_correlation", "delay_low_frequency", "bandwidth_phase90")
-"""Those that move when one channel's clock moves against the other's."""
+"""Parameters that change when the clock of one channel shifts against that of the other."""
 
 GAIN = (
     "scale_factor",
@@ -45,7 +45,7 @@ GAIN = (
     "bandwidth_3db",
     "peak_gain_db",
 )
-"""Those that depend on the size of the response."""
+"""Parameters that depend on the size of the response."""
 
 FIXED_UNITS = {
     "delay": "s",

@@ -36,9 +36,9 @@ class Identification(ByValue):
 
     Index it output first, as in a transfer matrix: ``result["y", "u"].delay``; the output alone
     is enough where there is one input. Iterating yields the pairs.
-    `inputs` says how well several inputs are told apart, and how much of each output they
-    explain; None where there is one. `data` is the record itself, kept for pictures; its digest
-    in `record` stands for it in the JSON and where results are compared.
+    `inputs` says how well several inputs are distinguished, and how much of each output they
+    explain; None for a single input. `data` is the record itself, kept for pictures; the JSON and
+    comparisons of results use its digest in `record` instead.
     """
 
     record: RecordSummary
@@ -68,13 +68,13 @@ class Identification(ByValue):
             for pair in self.pairs
             for row in pair_rows(pair) or [["–", "–", "–", pair.verdict]]
         ]
-        said = dict.fromkeys(w.message for pair in self.pairs for w in pair.warnings)
+        messages = dict.fromkeys(w.message for pair in self.pairs for w in pair.warnings)
         source = f" of {self.record.source}" if self.record.source else ""
         return html_table(
             f"Identification{source}: {self.verdict}",
             ["from → to", "parameter", "value", "95 %", "verdict"],
             rows,
-            notes=list(said),
+            notes=list(messages),
         )
 
     @property
@@ -86,10 +86,10 @@ class Identification(ByValue):
 
     @property
     def counted(self) -> tuple[PairIdentification, ...]:
-        """Pairs but those of an output with an input that it is not coupled to.
+        """All pairs except those of an output with an input that it is not coupled to.
 
-        That an axis does not follow another one's command is a finding, no failure, as long as
-        it follows some input.
+        It is a finding, not a failure, that an axis does not follow the command of another axis, as
+        long as it follows some input.
         """
         if self.inputs is None:
             return self.pairs
@@ -118,7 +118,7 @@ class Identification(ByValue):
         Raises
         ------
         FormatError
-            If `data` is of no schema that is known.
+            If the schema of `data` is not known.
         """
         schema = data.get("schema")
         if schema not in (SCHEMA, FIRST_SCHEMA):

@@ -1,4 +1,4 @@
-"""Several inputs driven at once: which are told apart, and what all of them explain."""
+"""Several inputs driven at once: which are distinguished, and how much all of them explain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ __all__ = ["Alike", "InputSet", "OutputCoherence"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Alike(Plain):
-    """Inputs that are not told apart, and where.
+    """Inputs that are not distinguished, and where.
 
     Parameters
     ----------
@@ -48,9 +48,8 @@ class OutputCoherence(ByValue, Plain):
     output : str
         Name.
     frequency, multiple : ndarray, shape (f,)
-        Hz, and the multiple coherence, 0 to 1, the number of coefficients taken off. That of
-        one input, what it explains of what the others leave over, stands with each pair's
-        frequency response.
+        Hz, and the multiple coherence, 0 to 1, corrected for the number of coefficients. The
+        partial coherence of one input, given the others, is in each pair's frequency response.
     """
 
     output: str
@@ -60,21 +59,21 @@ class OutputCoherence(ByValue, Plain):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InputSet(ByValue, Plain):
-    """Several inputs driven at once, and how well one record tells them apart.
+    """Several inputs driven at once, and how well one record distinguishes them.
 
     Parameters
     ----------
     names : tuple of str
         Of the inputs.
     bands : tuple of (float, float)
-        What each one excites, Hz.
+        Excited by each of them, Hz.
     frequency : ndarray, shape (f,)
         Hz.
     condition : ndarray, shape (f,)
-        Condition number of the errors of the responses, of those inputs that excite the
-        frequency; each counts with its own power. 1 for inputs that have nothing in common.
+        Condition number of the errors of the responses, for those inputs that excite the
+        frequency; each counts with its own power. 1 for uncorrelated inputs.
     alike : tuple of Alike
-        Inputs that are not told apart, and where.
+        Inputs that are not distinguished, and where.
     coherence : tuple of OutputCoherence
         One for each output.
     """
@@ -88,11 +87,11 @@ class InputSet(ByValue, Plain):
 
     @property
     def usable(self) -> Mask:
-        """Where the inputs are told apart: condition at most 10, shape (f,)."""
+        """Where the inputs are distinguished: condition at most 10, shape (f,)."""
         return np.asarray(self.condition <= MATERIAL**-0.5)
 
     def alike_bins(self, samples: int, fs: float) -> tuple[tuple[frozenset[int], Mask], ...]:
-        """Inputs that are not told apart, and which bins of a transform of `samples` that is."""
+        """Inputs that are not distinguished, and the bins of a transform of `samples` there."""
         frequency = np.arange(samples // 2 + 1) * (fs / samples)
         found = []
         for group in self.alike:

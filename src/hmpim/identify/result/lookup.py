@@ -6,19 +6,17 @@ from typing import Protocol, TypeVar
 from hmpim.arguments import shown
 from hmpim.errors import RecordError
 
-__all__ = ["Pair", "find_pair"]
+__all__ = ["find_pair"]
 
 
-class Pair(Protocol):
-    """Anything that belongs to one input and one output."""
-
+class _Pair(Protocol):
     @property
-    def input(self) -> str: ...  # noqa: D102
+    def input(self) -> str: ...
     @property
-    def output(self) -> str: ...  # noqa: D102
+    def output(self) -> str: ...
 
 
-P = TypeVar("P", bound=Pair)
+P = TypeVar("P", bound=_Pair)
 
 
 def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
@@ -31,7 +29,7 @@ def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
     key : (str, str) or str
         Output and input, or the output.
     holder : str
-        What has the pairs, for the message: 'the result'.
+        Owner of the pairs, for the message: 'the result'.
 
     Raises
     ------

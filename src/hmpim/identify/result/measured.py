@@ -1,4 +1,4 @@
-"""What is measured without a model: the frequency response, bandwidths, what is nonlinear."""
+"""Measurements without a model: the frequency response, bandwidths, nonlinearity."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class FrequencyResponse(ByValue):
     std : ndarray, shape (m,)
         Standard deviation of |error|: sqrt(E|Ĝ-G|²), same unit as the response.
     coherence : ndarray, shape (m,), or None
-        None where it means nothing, as with a single segment.
+        None where it has no meaning, as with a single segment.
     """
 
     frequency: Real
@@ -77,8 +77,8 @@ class HarmonicCurve(Plain):
     frequency : tuple of float
         Frequency of the sweep itself, Hz.
     amplitude, std : tuple of float
-        Amplitude of the harmonic while the sweep is there, and its standard deviation, in the
-        output's unit.
+        Amplitude of the harmonic when the sweep has that frequency, and its standard deviation, in
+        the output's unit.
     """
 
     order: int
@@ -89,28 +89,27 @@ class HarmonicCurve(Plain):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nonlinearity(Plain):
-    """What no linear system makes of the input, and what it looks like.
+    """The nonlinear part of the output, and its kind.
 
     Parameters
     ----------
     share : float
-        R.m.s. of the nonlinear part over that of the output about its mean; 0 if none is seen.
+        R.m.s. of the nonlinear part over that of the output about its mean; 0 if none is detected.
     even, odd : float
-        The same for the part that is asymmetric and the part that is alike either way, noise
-        taken off.
+        The same for the asymmetric part and the symmetric part, without the noise.
     noise, linear, nonlinear : float
-        What the power of the residual is made of; they add to 1. `linear` still follows the
-        input: dynamics left out, and what of a nonlinearity looks linear.
+        Shares of the power of the residual; they add to 1. `linear` still follows the input:
+        dynamics that the model lacks, and the part of a nonlinearity that looks linear.
     kinds : tuple of str
-        What the record leaves in question: one if it tells ('hardening', 'softening',
+        Kinds that are possible: one if the record determines it ('hardening', 'softening',
         'friction', 'backlash', 'rate_limit', 'saturation', 'asymmetry', 'curvature',
         'dead_zone'), several
-        if not, none if it is like none of them or too small to ask.
+        if it does not, none if no kind fits or the nonlinear part is too small.
     size : Estimate or None
         Of the kind, if there is one: half width of the band of friction, backlash or a dead zone,
         speed, level, or share by which the largest deflection departs from proportion.
     harmonics : tuple of HarmonicCurve
-        Of a sweep in which there is something to see; order 1 is the output itself.
+        For a sweep with visible harmonics; order 1 is the output itself.
     """
 
     share: float

@@ -1,4 +1,4 @@
-"""All that is known of one input and one output."""
+"""The result for one input and one output."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -19,7 +19,7 @@ __all__ = ["Candidate", "PairIdentification", "pair_rows"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate(Plain):
-    """One structure that was tried: how well it fits and what its fit costs.
+    """One structure that was tried: how well it fits, and its criterion.
 
     `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
     100 (1 - ||y - ŷ|| / ||y - mean y||).
@@ -33,10 +33,10 @@ class Candidate(Plain):
 
 
 class _Figure:
-    """One of the pair's parameters, by its own name."""
+    """A descriptor that gives the parameter of its own name."""
 
-    def __init__(self, said: str) -> None:
-        self.__doc__ = said
+    def __init__(self, doc: str) -> None:
+        self.__doc__ = doc
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -53,17 +53,17 @@ class _Figure:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairIdentification(ByValue, Plain):
-    """Everything found between one input and one output.
+    """The result for one input and one output.
 
-    `dynamics` holds the rational dynamics that were fitted, without delay and with unit
-    gain at DC: numerator and denominator coefficients in powers of s (rad/s), highest
-    first. `covariance`, shape (q, q), is that of the delay in s, of the numerator times the scale
-    factor, and of the denominator before its last coefficient that is not 0, in the same order;
-    None where nothing was identified. `prediction` and `residual` (shape (n,), the output's unit)
-    are on the record's own uniform clock `time`; they follow from the record, and are part neither
-    of the JSON nor of equality. `from_response` holds bandwidths read off the measured response, to
-    be held against the model's. `nonlinearity` is None where the output does not follow the input
-    at all. `stopping` says that the run was ended because it was sure.
+    `numerator` and `denominator` are the fitted dynamics without delay and with unit gain at DC:
+    coefficients in powers of s (rad/s), highest first. `covariance`, shape (q, q), is that of the
+    delay in s, of the numerator times the scale factor, and of the denominator before its last
+    coefficient that is not 0, in the same order; None where nothing was identified. `prediction`
+    and `residual` (shape (n,), the output's unit) are on the record's own uniform clock `time`;
+    they follow from the record, and are part neither of the JSON nor of equality. `from_response`
+    holds bandwidths read off the measured response, for comparison with the model's.
+    `nonlinearity` is None where the output does not follow the input at all. `stopping` says that
+    the run ended early because the result was certain.
     """
 
     input: str
@@ -88,9 +88,9 @@ class PairIdentification(ByValue, Plain):
     stopping: Stopping | None = None
 
     def __repr__(self) -> str:
-        told = dict(_given(self.parameters))
-        said = [f"{name} {told[name]}" for name in _FIRST if name in told]
-        what = ", ".join([self.structure, self.verdict, *said])
+        known = dict(_known(self.parameters))
+        figures = [f"{name} {known[name]}" for name in _FIRST if name in known]
+        what = ", ".join([self.structure, self.verdict, *figures])
         return f"PairIdentification({shortened([self.input])} → {shortened([self.output])}: {what})"
 
     def _repr_html_(self) -> str:
@@ -129,7 +129,7 @@ class PairIdentification(ByValue, Plain):
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
         """Read back what `to_dict` wrote."""
-        response = data.get("bandwidths_from_response", {})  # results written before it have none
+        response = data.get("bandwidths_from_response", {})  # older results have none
         return by_fields(cls, {**data, **data["dynamics"], "from_response": response})
 
     delay = _Figure("Pure delay, s.")
@@ -154,18 +154,18 @@ class PairIdentification(ByValue, Plain):
 
 
 _FIRST = ("delay", "natural_frequency", "time_constant", "damping_ratio")
-"""Figures that a line has room for."""
+"""Figures that are shown on one line."""
 
 
-def _given(parameters: Parameters) -> list[tuple[str, Estimate]]:
+def _known(parameters: Parameters) -> list[tuple[str, Estimate]]:
     named = ((each.name, getattr(parameters, each.name)) for each in fields(parameters))
     return [(name, estimate) for name, estimate in named if estimate is not None]
 
 
 def pair_rows(pair: PairIdentification) -> list[list[str]]:
-    """Name, value with its error, interval and verdict of each figure that there is."""
+    """Name, value with its error, interval and verdict of each known figure."""
     rows = []
-    for name, estimate in _given(pair.parameters):
+    for name, estimate in _known(pair.parameters):
         low, high = estimate.ci95 or (None, None)
         between = interval(low, high, value=estimate.value, std=estimate.std)
         rows.append([name.replace("_", " "), estimate.text, between, estimate.verdict])

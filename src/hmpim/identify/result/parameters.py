@@ -10,7 +10,7 @@ __all__ = ["PaperEstimates", "Parameters"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters(Estimates):
-    """Every parameter of one input-output pair; None where the record cannot tell.
+    """Every parameter of one input-output pair; None where the record does not determine it.
 
     Frequencies in Hz, times in s, the rest in the channels' own units (`scale_factor`
     in output unit per input unit; `damping_ratio` without unit; `peak_gain_db` in dB).
@@ -37,10 +37,10 @@ class Parameters(Estimates):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperEstimates(Plain):
-    """The figures that section IV of the paper gives when done step by step, as printed.
+    """The figures of section IV of the paper, step by step as printed.
 
-    Times in s, frequencies in Hz, bias and noise in the output's unit; None where the
-    step has no answer on this record.
+    Times in s, frequencies in Hz, bias and noise in the output's unit; None where a step gives
+    nothing for this record.
     """
 
     delay: float | None = None

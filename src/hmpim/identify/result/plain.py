@@ -23,8 +23,8 @@ class Plain:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the value as plain JSON values."""
-        told: Any = self
-        return {field.name: plain(getattr(self, field.name)) for field in fields(told)}
+        own: Any = self
+        return {field.name: plain(getattr(self, field.name)) for field in fields(own)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -35,8 +35,8 @@ class Plain:
 def by_fields(cls: type[T], data: Mapping[str, Any]) -> T:
     """Return a dataclass from its fields as plain JSON values.
 
-    One that may be None may be missing: results that were written before it was known lack it. One
-    that is not compared is not read.
+    A field that may be None may be missing, as in results of older versions. A field that is not
+    compared is not read.
     """
     known: Any = cls
     kinds, made = _kinds_of(known), {}

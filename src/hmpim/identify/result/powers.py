@@ -1,4 +1,4 @@
-"""The one order of coefficients that people and files see: highest power first."""
+"""The order of coefficients for people and files: highest power first."""
 
 import numpy as np
 

@@ -5,12 +5,13 @@ run         one run: products of its samples, and its two ends
 statistics  runs of one input and one output: compress, update, join
 products    products of filtered signals over the samples that count
 start       a response without a model, from which the starts are found
-fit         one structure, by the joint fit's own optimiser, and its residual
-misfit      whether what is left over follows the input; one more pole
-beyond      what no linear system does: harmonics, standstills
-choose      the joint fit's own search, with products in place of samples
-describe    what is said of the pair
-live        the estimate so far, while samples come
+fit         one structure, by the optimiser of the joint fit, and its residual
+misfit      whether the residual follows the input; one more pole
+beyond      nonlinearity and held outputs
+limits      cases that statistics cannot distinguish
+choose      the search of the joint fit, with products in place of samples
+describe    the result for the pair
+live        the estimate so far, while samples arrive
 """
 
 from hmpim.identify.statistics.live import LiveEstimator, Look

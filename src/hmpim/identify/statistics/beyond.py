@@ -1,130 +1,103 @@
-"""Nonlinearity and held outputs, detected from statistics: a score test, and how long values stay.
+"""Nonlinearity and held outputs, detected from statistics.
 
-An odd distortion of a sweep (friction, backlash, a dead zone, a limited speed, a cubic spring) puts
-what has three times its frequency into the output, and so does the cube of the input. Short
-responses to the cube are asked for beside all parameters of the model, and beside the same
-responses to the input itself, since a linear system may have those (C. R. Rao, Proc. Camb. Phil.
-Soc. 44, 1948). Under a linear system of any kind what they gain is chi-squared. The cube of a
-binary input is the input: it leaves nothing to ask.
+An odd distortion of a sweep (friction, backlash, a dead zone, a limited speed, a cubic spring) adds
+three times its frequency to the output, and so does the cube of the input. A score test (C. R. Rao,
+Proc. Camb. Phil. Soc. 44, 1948) checks whether short responses to the cube explain the residual,
+after all parameters of the model and the same responses to the input itself, which a linear system
+may have. Under any linear system the gain is chi-squared. The cube of a binary input is the input
+itself, so that nothing can be tested.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
+from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.statistics.fit import Fitted
-from hmpim.identify.statistics.misfit import asked_of
+from hmpim.identify.statistics.misfit import explained_by, probes_at
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.run import STOOD, cubes_by, of_cubes
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import FEW, MUCH
 from hmpim.record import Finding
 
-__all__ = ["UNDELAYED", "Beyond", "beyond_of", "held_for", "is_told", "said_beyond"]
+__all__ = ["UNDELAYED", "beyond_of", "has_cubes", "held_for", "nonlinear_findings"]
 
 _GROUPS = 5
-"""Frequencies that are asked for, from 0 to the cube's highest."""
+"""Frequencies that are tested, from 0 to the highest of the cube."""
 
 _TIMES = 3.0
-"""The cube of a sinusoid has so many times its frequency, and a third of the amplitude there."""
+"""The cube of a sinusoid has a part at three times its frequency, with a third of the amplitude."""
 
 _SEEN = 1e-6
-"""Share of a direction that the input's own responses leave, below which it is not asked for."""
+"""Share of a direction's power, below which the input's own responses explain it and it is not
+tested."""
 
 UNDELAYED = ("scale_factor", "bias")
-"""Figures of slow motion, which an output that is held shows as it is."""
+"""Figures of slow motion, which a held output shows without error."""
 
 _FEWEST = 10
 """Values that an output must have kept before it counts as held."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Beyond:
-    """What responses to the cube of the input explain beyond chance.
-
-    Parameters
-    ----------
-    share : float
-        Of the residual's power.
-    probability : float
-        That a linear system does as much.
-    """
-
-    share: float
-    probability: float
-
-
-def is_told(statistics: Statistics) -> bool:
-    """Whether products of the cube are kept of every run."""
+def has_cubes(statistics: Statistics) -> bool:
+    """Whether products of the cube are kept for every run."""
     return statistics.reach.beyond and all(run.cubed for run in statistics.runs)
 
 
-def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> Beyond:
+def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> Misfit:
     """Test whether the residual of a fit follows the cube of the input.
 
-    Parameters
-    ----------
-    fitted : Fitted
-        The fit.
-    products : Products
-        With what the fit leaves over whitened.
-    band : (float, float)
-        Excited band, in cycles per sample.
+    The products are those that whiten the residual; the excited band is in cycles per sample.
     """
     statistics = replace(products.statistics, bias="own")
     reach, runs = statistics.reach, statistics.runs
     scale = max(float(run.scale[0]) for run in runs)
     thirds = replace(statistics, runs=tuple(of_cubes(run, reach, scale) for run in runs))
-    inputs, cubes = (products.alike(one) for one in (statistics, thirds))
+    inputs, cubes = products.alike(statistics), products.alike(thirds)
     highest = min(_TIMES * band[1], 0.5)
-    rows = asked_of(fitted.delay, (0.0, highest), products, groups=_GROUPS).rows
-    asked = _ending(np.vstack([rows, fitted.response]))
-    beside = fitted.responses.and_also(_ending(rows))
-    third, first = cubes.moments(asked), inputs.moments(beside)
+    rows = probes_at(fitted.delay, (0.0, highest), products, groups=_GROUPS).rows
+    tested = _ending(np.vstack([rows, fitted.response]))
+    linear = fitted.responses.and_also(_ending(rows))
+    third, first = cubes.moments(tested), inputs.moments(linear)
     ends = products.to_the_end
     lags = np.sum([cubes_by(run, reach, scale, to_the_end=ends) for run in runs], axis=0)
-    mixed = cubes.across(asked, inputs, beside, lags)
-    count, linear = fitted.weights.size, fitted.weights
-    cross = third.cross - mixed[:, :count] @ linear
-    left_first = first.cross - first.gram[:, :count] @ linear
+    mixed = cubes.across(tested, inputs, linear, lags)
+    count, weights = fitted.weights.size, fitted.weights
+    cross = third.cross - mixed[:, :count] @ weights
+    residual = first.cross - first.gram[:, :count] @ weights
     shift = -solved(first.gram, mixed.T)
-    gain, left = cross + shift.T @ left_first, third.gram + mixed @ shift
-    cost = first.energy - float(linear @ (first.cross[:count] + left_first[:count]))
-    cost -= float(left_first @ solved(first.gram, left_first))
+    gain, left = cross + shift.T @ residual, third.gram + mixed @ shift
+    cost = first.energy - float(weights @ (first.cross[:count] + residual[:count]))
+    cost -= float(residual @ solved(first.gram, residual))
     size = np.sqrt(np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0))
     left = left / np.outer(size, size)
-    if float(np.mean(np.diag(left))) < MUCH:  # all but binary: its edges lie between the samples
-        return Beyond(share=0.0, probability=1.0)
+    almost_binary = float(np.mean(np.diag(left))) < MUCH  # its edges lie between the samples
     values, vectors = np.linalg.eigh(left)
     kept = values > _SEEN
     freedom = int(kept.sum())
-    if not freedom or cost <= 0.0:
-        return Beyond(share=0.0, probability=1.0)
-    power = float(np.sum((vectors.T @ (gain / size))[kept] ** 2 / values[kept]))
-    variance = cost / max(products.counted - beside.rows.shape[0] - freedom, 1)
-    return Beyond(
-        share=max((power - freedom * variance) / cost, 0.0),
-        probability=float(scipy.special.chdtrc(freedom, power / variance)),
-    )
+    if almost_binary or not freedom or cost <= 0.0:
+        return Misfit(share=0.0, probability=1.0)
+    explained = (vectors.T @ (gain / size))[kept] ** 2 / values[kept]
+    return explained_by(explained, cost, products.counted - linear.rows.shape[0] - freedom)
 
 
 def _ending(rows: Real) -> Responses:
-    return Responses.ending(rows, np.zeros(rows.shape[0]))  # each run has a bias of its own
+    return Responses.ending(rows, np.zeros(rows.shape[0]))  # each run has its own bias
 
 
 def held_for(statistics: Statistics) -> float | None:
-    """Samples for which an output keeps each of its values, where it is updated by a slower clock.
+    """Samples for which an output keeps each of its values, if a slower clock updates it.
 
     Such an output changes at most every second sample, and each value lasts the same number of
-    samples, or one more. Noise repeats no value, and rounding repeats them for as long as the
+    samples, or one more. Noise repeats no value, and rounding repeats values for as long as the
     output is slow.
     """
     counts = np.sum([run.stood[1:] for run in statistics.runs], axis=0)
@@ -132,31 +105,21 @@ def held_for(statistics: Statistics) -> float | None:
     if total < _FEWEST:
         return None
     shortest = int(np.searchsorted(np.cumsum(counts), FEW * total)) + 1
-    steady = float(counts[shortest - 1 : shortest + 1].sum())
+    near = slice(shortest - 1, shortest + 1)
+    steady = float(counts[near].sum())
     if shortest == 1 or shortest == STOOD or steady < (1.0 - FEW) * total:
         return None
-    lengths = np.arange(1, STOOD + 1)
-    near = slice(shortest - 1, shortest + 1)
-    return float(counts[near] @ lengths[near]) / steady
+    return float(counts[near] @ np.arange(1, STOOD + 1)[near]) / steady
 
 
-def said_beyond(
-    statistics: Statistics, found: Beyond | None, evidence: Evidence
+def nonlinear_findings(
+    statistics: Statistics, found: Misfit | None, evidence: Evidence
 ) -> tuple[Finding, ...]:
-    """Say what no linear system does.
+    """Report a held output, and a residual that follows the cube of the input.
 
     A linear fit absorbs the part of a distortion at the input's own frequency, which is `_TIMES`
-    its harmonic, of the cube as of friction. Doubted are the figures that so much may move by a
-    hundredth.
-
-    Parameters
-    ----------
-    statistics : Statistics
-        What was read.
-    found : Beyond or None
-        Of the cube of the input; None where it is not kept, and nothing is said.
-    evidence : Evidence
-        Of the fit.
+    its harmonic, for the cube as for friction. Figures that this may move by a hundredth are
+    doubted. Nothing is reported where no cube is kept and `found` is None.
     """
     if found is None:
         return ()

@@ -26,9 +26,9 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
-from hmpim.identify.statistics.beyond import Beyond, beyond_of, is_told
+from hmpim.identify.statistics.beyond import beyond_of, has_cubes
 from hmpim.identify.statistics.fit import Compressed, Fitted, as_fitted, pulse
-from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of
+from hmpim.identify.statistics.misfit import hidden_pole_of, misfit_of, probes_at
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
@@ -43,13 +43,13 @@ _FEWEST = 50
 """Samples that must count."""
 
 _FORGOTTEN = 1e-4
-"""Of an impulse response's peak, below which it is over."""
+"""Share of an impulse response's peak below which the response has ended."""
 
 _TASTE = 5
 """Steps with an integrator from each start, before the best is followed if it is not hopeless."""
 
 _LOOKS = 3
-"""How often it is asked which samples at the ends count."""
+"""How often the samples that count at the ends are determined again."""
 
 _ALL = Counted(valid=None, begins=None)
 """No selection: the products hold only samples that count."""
@@ -57,22 +57,14 @@ _ALL = Counted(valid=None, begins=None)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CompressedData(Data):
-    """What every trial shares, of a record of which no sample is kept.
+    """What every trial of a compressed record shares."""
 
-    Parameters
-    ----------
-    products : Products
-        Without a noise model.
-    excited : (float, float)
-        Excited band, in cycles per sample.
-    """
-
-    products: Products
-    excited: tuple[float, float]
+    products: Products  # without a noise model
+    excited: tuple[float, float]  # band in cycles per sample
 
     @classmethod
     def of(cls, statistics: Statistics, *, skipped: int) -> "CompressedData":
-        """Make it from statistics; the first outputs of each run, so many, do not count."""
+        """Return the data of statistics; the first `skipped` outputs of each run do not count."""
         low, high = excited(statistics)
         return cls(
             u=np.empty(0),
@@ -85,7 +77,7 @@ class CompressedData(Data):
         )
 
     def problem(self, mode: Intersample, seen: Counted) -> Compressed:
-        """The products under one assumption, and the noise model."""
+        """The products under one assumption and the noise model."""
         if (mode, True) not in self.sources:
             self.sources[mode, True] = pulse(self.products.statistics.reach, mode)
         noise = np.ones(1) if self.noise is None else self.noise
@@ -97,46 +89,40 @@ class CompressedData(Data):
         return self.excited
 
     def misfit(self, fit: Fit) -> Misfit:
-        """How much of what is left over follows the input, whatever its own colour."""
-        return misfit_of(as_fitted(fit), _whitening(as_fitted(fit)), self.band)
+        """How much of the residual follows the input, whatever its colour."""
+        fitted = as_fitted(fit)
+        products = fitted.whitening
+        return misfit_of(fitted, products, self.band, probes_at(fit.delay, self.band, products))
 
-    def beyond(self, fit: Fit) -> Beyond | None:
-        """How much of it follows the cube of the input; None where that is not kept."""
-        if not is_told(self.products.statistics):
+    def beyond(self, fit: Fit) -> Misfit | None:
+        """How much of the residual follows the cube of the input; None where no cube is kept."""
+        if not has_cubes(self.products.statistics):
             return None
-        return beyond_of(as_fitted(fit), _whitening(as_fitted(fit)), self.band)
+        return beyond_of(as_fitted(fit), as_fitted(fit).whitening, self.band)
 
     def noise_left(self, problem: Problem, fit: Fit) -> Real:
-        """Autoregression of what a fit leaves over, 1 first; 1 alone where it is white."""
+        """Autoregression of the residual of a fit, 1 first; 1 alone where it is white."""
         return as_fitted(fit).left.noise
 
     def level_left(self, problem: Problem, fit: Fit, noise: Real) -> None:
-        """Of a level that changes products say nothing."""
+        """Products do not show a noise level that changes."""
 
     def rough_left(self, fit: Fit) -> RoughResponse:
-        """Rough response of what a fit leaves over."""
+        """Rough response of the residual of a fit."""
         known = as_fitted(fit).response
         return rough_of(self.products.statistics, known=known, lag=self.rough.lag)
 
     def is_unexplainable(self, problem: Problem, fit: Fit, *, least: float = 0.0) -> bool:
-        """Whether a constant explains as much, and what is left over does not follow the input."""
-        share = 1.0 if as_fitted(fit).products.order else fit.share
-        spread = as_fitted(fit).products.energy
-        gained = problem.counted * share * float(np.log(max(spread / fit.objective, 1.0)))
+        """Whether a constant explains as much, and the residual does not follow the input."""
+        products = as_fitted(fit).products
+        share = 1.0 if products.order else fit.share
+        gained = problem.counted * share * float(np.log(max(products.energy / fit.objective, 1.0)))
         limit = float(scipy.special.chdtri(fit.structure.parameters, FALSE_ALARM))
         return gained <= limit and self.misfit(fit).probability >= FALSE_ALARM
 
     def hidden_pole(self, problem: Problem, fit: Fit) -> HiddenPole:
-        """What the statistics say of one more pole beside a fit."""
+        """The test of a fit for one more pole."""
         return hidden_pole_of(as_fitted(fit))
-
-
-def _whitening(fitted: Fitted) -> Products:
-    """Products with what a fit leaves over whitened."""
-    products = fitted.products
-    if products.order or fitted.is_white:
-        return products
-    return products.whitened(fitted.left.noise)
 
 
 def choose(
@@ -145,15 +131,10 @@ def choose(
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] | None = None,
 ) -> tuple[CompressedData, JointFit]:
-    """Fit every structure and keep the one that the statistics support.
+    """Fit every structure and choose one, as from samples; every fit is a `Fitted`.
 
-    All trials are as from samples, but their fits are `Fitted`. Arguments are those of
-    `identify_statistics`.
-
-    Raises
-    ------
-    RecordError
-        If too few samples count.
+    Arguments are those of `identify_statistics`. A `RecordError` is raised if too few samples
+    count.
     """
     if intersample == "sampled":
         raise RecordError("intersample='sampled' needs the samples; identify the record itself")
@@ -170,9 +151,9 @@ def choose(
 def _look_and_choose(
     data: CompressedData, course: Course, names: tuple[StructureName, ...], *, alone: bool
 ) -> tuple[CompressedData, JointFit]:
-    """Choose by the samples that count, and again where the chosen fit shows that others do.
+    """Choose by the samples that count, and again where the chosen fit shows that others count.
 
-    The first ones of several runs never count, and of a run too short to do without them all do.
+    The first samples of several runs never count. All samples of a single short run count.
     """
     products, best = data.products, as_fitted(course.best)
     joint, begins = None, alone and products.skipped > 0
@@ -196,12 +177,11 @@ def _look_and_choose(
 
 
 def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit) -> Fitted | None:
-    """Return an integrator unless what was chosen is clearly likelier, each under its own noise.
+    """Return an integrator unless the chosen fit is clearly likelier, each under its own noise.
 
-    Beside no model at all it must explain more than a search does by chance.
-
-    An integrator is exact here: its response less what it keeps ends within the window, and what it
-    keeps multiplies the running sum of the input.
+    Where the output is unrelated, an integrator must explain more than a search does by chance.
+    Its fit is exact: its response less the final value ends within the window, and the final value
+    multiplies the running sum of the input.
     """
     rough = rough_of(statistics, differenced=True)
     mode, found, best = joint.best.intersample, [], as_fitted(joint.best.fit)
@@ -226,16 +206,16 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
 
 
 def _criterion(fit: Fitted, count: int) -> float:
-    """Schwarz's criterion of a fit under the autoregression of what it leaves over."""
+    """Schwarz's criterion of a fit under the autoregression of its residual."""
     left = fit.left
-    # Of sums that cancel, rounding may leave less than 0.
+    # Where sums cancel, rounding may make the power negative.
     least = np.finfo(float).eps * fit.products.plain.energy / count
     parameters = fit.structure.parameters + left.noise.size - 1
     return float(count * np.log(max(left.innovation, least)) + parameters * np.log(count))
 
 
 def _is_conditioned(statistics: Statistics) -> bool:
-    """Whether the first outputs of each run can be spared; they must be, of several runs."""
+    """Whether the first outputs of each run are left out; those of several runs must be."""
     shortest = min(run.samples for run in statistics.runs)
     lags = statistics.reach.lags
     if len(statistics.runs) > 1 and shortest - lags < _FEWEST:
@@ -253,7 +233,7 @@ def _is_conditioned(statistics: Statistics) -> bool:
 
 
 def _looks_held(statistics: Statistics) -> bool:
-    """Whether the input looks held where its samples are kept."""
+    """Whether the input looks held at the ends of the runs, where its samples are kept."""
     ends = [run.head_u[: run.samples] for run in statistics.runs]
     ends += [run.tail_u[-run.samples :] for run in statistics.runs]
     moving = [end for end in ends if np.ptp(end) > 0.0]
@@ -261,10 +241,10 @@ def _looks_held(statistics: Statistics) -> bool:
 
 
 def _rests(best: Fitted) -> bool:
-    """Whether a run begins at rest: what its beginning leaves over is noise, if it does.
+    """Whether a run begins at rest, so that the residual of its beginning is noise.
 
-    Its power is chi-squared, and so is what a free response of the state explains of it. The noise
-    is told by the samples behind, which a free response does not colour.
+    The power of that noise is chi-squared, and so is the power that a free response of the state
+    explains. The noise is estimated from later samples, which a free response does not colour.
     """
     products, lags = best.products.plain, best.products.statistics.lags
     behind = products.alike(skipped=_memory(best))
@@ -272,7 +252,7 @@ def _rests(best: Fitted) -> bool:
     begins = int(np.ceil(max(best.delay, 0.0))) + 4
     problem = replace(best.problem, begins=begins)
     free = Part(problem, best.structure, best.theta).free[:, :lags]
-    head = best.left_over.heads[0, :lags]
+    head = best.remainder.heads[0, :lags]
     every = np.vstack([head, free])
     head, *free_rows = scipy.signal.lfilter(left.noise, np.ones(1), every)[:, left.noise.size :]
     if float(head @ head) > 2.0 * left.innovation * scipy.special.chdtri(head.size, FALSE_ALARM):
@@ -286,17 +266,17 @@ def _rests(best: Fitted) -> bool:
 
 
 def _ends_quietly(best: Fitted) -> bool:
-    """Whether what the ends of the runs leave over is noise; a band-limited input rings there."""
+    """Whether the residual at the ends of the runs is noise; a band-limited input rings there."""
     left, runs = best.left, len(best.products.statistics.runs)
     if best.problem.source.degree <= 1 or left.counted < _FEWEST + AHEAD * runs:
         return True
-    tails = scipy.signal.lfilter(left.noise, np.ones(1), best.left_over.tails)[:, left.noise.size :]
+    tails = scipy.signal.lfilter(left.noise, np.ones(1), best.remainder.tails)[:, left.noise.size :]
     limit = float(scipy.special.chdtri(max(tails.size, 1), FALSE_ALARM))
     return float(np.sum(tails**2)) <= left.innovation * limit
 
 
 def _memory(fitted: Fitted) -> int:
-    """Outputs that answer what came before a run, by the best fit so far and half as many again."""
+    """Outputs that depend on the input before a run, by the best fit, and half as many again."""
     size = np.abs(fitted.response)
     last = int(np.max(np.flatnonzero(size > _FORGOTTEN * size.max()), initial=AHEAD)) - AHEAD
     return int(np.clip(1.5 * last, 1, fitted.products.statistics.lags))

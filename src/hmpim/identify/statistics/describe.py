@@ -1,4 +1,4 @@
-"""All that is said of a pair that was identified from statistics."""
+"""The result for a pair that is identified from statistics."""
 
 import hashlib
 
@@ -38,7 +38,7 @@ from hmpim.identify.result import (
     ResponseBandwidths,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
-from hmpim.identify.statistics.beyond import is_told, said_beyond
+from hmpim.identify.statistics.beyond import has_cubes, nonlinear_findings
 from hmpim.identify.statistics.choose import CompressedData, choose, integrator_of
 from hmpim.identify.statistics.fit import Fitted, as_fitted
 from hmpim.identify.statistics.limits import cut_response, drift_or_noise, perhaps_software
@@ -70,16 +70,16 @@ _CHECKS: tuple[Check, ...] = (
     cut_response,
     perhaps_software,
 )
-"""Those that need no samples."""
+"""Checks that need no samples."""
 
 _OVER = 1e-3
-"""Share of an impulse response's peak that may be left at the end of the window."""
+"""Greatest response at the end of the window, as a share of the impulse response's peak."""
 
 _SETTLES = 7.0
-"""Time constants after which less than that is left."""
+"""Time constants after which the response is smaller than that."""
 
 _DIGITS = float(np.sqrt(np.finfo(float).eps))
-"""Share of a figure that is lost where sums of squares are subtracted."""
+"""Relative error of a figure where sums of squares are subtracted."""
 
 _FREQUENCIES = 200
 
@@ -90,33 +90,37 @@ def identify_statistics(
     intersample: Intersample | None = None,
     structures: tuple[StructureName, ...] | None = None,
 ) -> Identification:
-    """Identify one pair from what was kept of its records.
+    """Identify one pair from compressed records.
 
     Parameters
     ----------
     statistics : Statistics
         From `hmpim.compress`.
     intersample : {'zoh', 'foh', 'bandlimited'}, optional
-        What the input does between its samples; as the statistics say, or the likeliest.
+        What the input does between its samples; by default as the statistics state it, or the
+        likeliest.
     structures : tuple of str, optional
-        Which to try; all by default. Integrators are asked for in any case, and refused.
+        Structures to try; all by default. Integrators are tried in any case, and refused.
 
     Raises
     ------
     RecordError
-        If the channels do not move, too little was read, or the memory is longer than the window,
-        as that of an integrator is.
+        If the channels do not move, too few samples were read, or the memory is longer than the
+        window, as that of an integrator is.
     """
     _check_moves(statistics)
     data, joint = choose(
-        statistics,
-        intersample=intersample or statistics.intersample,
-        structures=structures,
+        statistics, intersample=intersample or statistics.intersample, structures=structures
     )
-    best = as_fitted(joint.best.fit)
     if joint.related:
-        _check_window(statistics, best)
-    _check_integrator(statistics, integrator_of(statistics, data, joint))
+        _check_window(statistics, as_fitted(joint.best.fit))
+    found = integrator_of(statistics, data, joint)
+    if found is not None:
+        raise RecordError(
+            f"the output moves as if it integrated the input ({found.structure.name}), so that its "
+            f"memory is longer than any window, here {statistics.lags} samples; identify the "
+            "record itself"
+        )
     pair = (_related if joint.related else _unrelated)(statistics, data, joint)
     digest = hashlib.sha256()
     for run in statistics.runs:
@@ -132,21 +136,19 @@ def identify_statistics(
 
 
 def _check_moves(statistics: Statistics) -> None:
-    names = dict(zip(("input", "output"), statistics.names, strict=True))
-    still = {
-        "input": all(run.uu[0] == 0.0 for run in statistics.runs),
-        "output": all(run.vv[-1, -1, 0] == 0.0 for run in statistics.runs),
-    }
-    for role, name in names.items():
-        if still[role]:
-            level = statistics.runs[0].level[int(role == "output")] if statistics.runs else 0.0
+    runs = statistics.runs
+    powers = {"input": [run.uu[0] for run in runs], "output": [run.vv[-1, -1, 0] for run in runs]}
+    for k, (role, power) in enumerate(powers.items()):
+        if not any(power):
+            level = runs[0].level[k] if runs else 0.0
             raise RecordError(
-                f"{role} {name!r} is constant at {level:g}; nothing can be identified from it"
+                f"{role} {statistics.names[k]!r} is constant at {level:g}; nothing can be "
+                "identified from it"
             )
 
 
 def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
-    """Every figure of the chosen fit, and the covariance behind it."""
+    """Every figure of the chosen fit, and their covariance."""
     best, fs, share = as_fitted(joint.best.fit), statistics.fs, joint.weighed_share
     left, vector = best.left, np.concatenate([best.theta, best.linear])
     cov = widened(joint, best.covariance)
@@ -179,7 +181,7 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
 
 
 def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
-    """Say all that is known of an output that follows its input."""
+    """The result for an output that follows its input."""
     best, fs = as_fitted(joint.best.fit), statistics.fs
     band = (data.band[0] * fs, data.band[1] * fs)
     readings = _read(statistics, joint, min(band[1], fs / 2))
@@ -195,13 +197,14 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         fit_percent=_fit_percent(statistics, best.left.power),
         measured=ResponseBandwidths(),
     )
-    findings = judge(evidence, checks=_CHECKS)
-    if not evidence.is_without_noise:
-        findings = (*findings, *said_beyond(statistics, data.beyond(best), evidence))
-    parameters = readings.parameters
+    findings, parameters = judge(evidence, checks=_CHECKS), readings.parameters
     if evidence.is_without_noise:
         parameters = without_noise(parameters, _DIGITS)
+    else:
+        findings = (*findings, *nonlinear_findings(statistics, data.beyond(best), evidence))
     numerator, denominator = coefficients_of(system)
+    # Equation (8): the lag of the cross-correlation's peak. The paper's other steps need samples.
+    late = np.abs(correlations(statistics)[1][statistics.reach.forth :])
     frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
     return PairIdentification(
         input=statistics.names[0],
@@ -210,7 +213,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         intersample=joint.best.intersample,
         fit_percent=evidence.fit_percent,
         parameters=parameters,
-        paper=_paper(statistics),
+        paper=PaperEstimates(delay=float(np.argmax(late) / fs)),
         frequency_response=FrequencyResponse(
             frequency=frequency,
             response=np.asarray(response(system, frequency)),
@@ -243,16 +246,6 @@ def _check_window(statistics: Statistics, fit: Fitted) -> None:
     )
 
 
-def _check_integrator(statistics: Statistics, found: Fitted | None) -> None:
-    """Refuse an output that integrates its input."""
-    if found is not None:
-        raise RecordError(
-            f"the output moves as if it integrated the input ({found.structure.name}), so that its "
-            f"memory is longer than any window, here {statistics.lags} samples; identify the "
-            "record itself"
-        )
-
-
 def _fit_percent(statistics: Statistics, power: float) -> float:
     spread = 0.0
     for run in statistics.runs:
@@ -262,7 +255,7 @@ def _fit_percent(statistics: Statistics, power: float) -> float:
 
 
 def _candidates(statistics: Statistics, joint: JointFit) -> tuple[Candidate, ...]:
-    """All trials; the fit is said of the whitened output where the noise is coloured."""
+    """All trials, the likeliest first; where the noise is coloured, of the whitened output."""
     best = as_fitted(joint.best.fit)
     return tuple(
         Candidate(
@@ -278,16 +271,9 @@ def _candidates(statistics: Statistics, joint: JointFit) -> tuple[Candidate, ...
     )
 
 
-def _paper(statistics: Statistics) -> PaperEstimates:
-    """Equation (8): the lag of the cross-correlation's peak; the other steps need samples."""
-    _, cross = correlations(statistics)
-    late = np.abs(cross[statistics.reach.forth :])
-    return PaperEstimates(delay=float(np.argmax(late) / statistics.fs))
-
-
 def _no_samples(statistics: Statistics) -> Finding:
     left = "clipping, holds, rounding and harmonics were not looked for"
-    if is_told(statistics):
+    if has_cubes(statistics):
         left = (
             "clipping, rounding and even harmonics were not looked for, and holds and odd "
             "harmonics are detected but not modelled"
@@ -303,13 +289,11 @@ def _no_samples(statistics: Statistics) -> Finding:
 
 
 def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) -> PairIdentification:
-    """Say what little can be said of an output that a constant explains as well."""
+    """The result for an output that a constant explains as well."""
     best = as_fitted(joint.best.fit)
     products = best.products
-    mean = best.moments.bias
     variance = products.energy / max(products.counted - 1, 1)
-    name, source = statistics.names[1], statistics.names[0]
-    frequency = np.array([data.band[1] * statistics.fs])
+    source, name = statistics.names
     return PairIdentification(
         input=source,
         output=name,
@@ -318,23 +302,20 @@ def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) ->
         fit_percent=0.0,
         parameters=Parameters(
             bias=estimate(
-                mean,
+                best.moments.bias,
                 variance * best.moments.bias_variance,
                 freedom=products.counted - 1,
                 unit=statistics.units[1],
-            ),
+            )
         ),
         paper=PaperEstimates(),
         frequency_response=FrequencyResponse(
-            frequency=frequency,
+            frequency=np.array([data.band[1] * statistics.fs]),
             response=np.zeros(1, dtype=np.complex128),
             std=np.full(1, np.sqrt(variance)),
         ),
         numerator=(0.0,),
         denominator=(1.0,),
         candidates=(),
-        warnings=(
-            unfollowed(name, source),
-            _no_samples(statistics),
-        ),
+        warnings=(unfollowed(name, source), _no_samples(statistics)),
     )

@@ -1,8 +1,7 @@
-"""A structure fitted to statistics: the joint fit's own way down, on products of filters.
+"""A structure fitted to statistics: the iteration of the joint fit, on products of filters.
 
-An impulse response is what a structure answers to one sample of 1 among zeros, continued between
-the samples as the input is; its derivatives are known in closed form, since they are those of the
-joint fit's rows.
+An impulse response is the response of a structure to one sample of 1 among zeros, continued between
+the samples as the input is. Its derivatives are those of the joint fit's rows, in closed form.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,45 +26,39 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Compressed", "Fitted", "LeftOver", "as_fitted", "fit_briefly", "follow", "pulse"]
+__all__ = ["Compressed", "Fitted", "as_fitted", "fit_briefly", "follow", "pulse"]
 
 _FINAL = 1e-10
 """Precision of the chosen fit: 1e-5 standard deviations."""
 
 _NEAR = 0.25
-"""What a step may gain, in units of σ², so that where it leads need not be evaluated: a parameter
-then moves by half a standard deviation at most, and the error of that is of the square."""
+"""Gain of a step, in units of σ², up to which its end is predicted and not evaluated: a parameter
+then moves by half a standard deviation at most, and the error is of second order."""
 
 _CLOSE = 4.0
-"""The same where no other evaluation is to be made: two standard deviations."""
+"""The same where no other evaluation is allowed: two standard deviations."""
 
 _PRECISION = 1e-2
 """Precision of a fit whose evaluations are limited, see `fit_structure`."""
 
 _ROUNDED = 1e-13
-"""Share of the output's power below which what is left over is the rounding of sums."""
+"""Share of the output's power below which the residual is the rounding of sums."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Compressed(Problem):
-    """A pulse as input, and products in place of the samples of the output, which are not kept.
-
-    Parameters
-    ----------
-    products : Products
-        What was read, under a noise model.
-    """
+    """A pulse as input, and products under a noise model in place of the output's samples."""
 
     products: Products
     final: ClassVar[float] = _FINAL
 
     @classmethod
     def of(cls, products: Products, source: SampledInput) -> "Compressed":
-        """From products, and a pulse as `pulse` prepares it."""
+        """Make it from products, and a pulse prepared by `pulse`."""
         statistics = products.statistics
         return cls(
             source=source,
-            y=_nothing(statistics.samples),
+            y=np.broadcast_to(np.float64(0.0), (statistics.samples,)),  # takes no memory
             valid=None,
             longest_delay=float(statistics.lags),
             noise=products.noise if products.order else None,
@@ -84,7 +77,7 @@ class Compressed(Problem):
 
     @property
     def plain(self) -> "Compressed":
-        """The same, its noise taken for white."""
+        """The same with white noise."""
         return replace(self, noise=None, products=self.products.plain)
 
 
@@ -95,17 +88,12 @@ def pulse(reach: Reach, intersample: Intersample) -> SampledInput:
     return prepare_input(samples, intersample)
 
 
-def _nothing(samples: int) -> Real:
-    """Return zeros that take no memory, in place of the samples that were read."""
-    return np.broadcast_to(np.float64(0.0), (samples,))
-
-
 class _SpentError(Exception):
-    """All evaluations that there may be were made."""
+    """All allowed evaluations were made."""
 
 
 class _Evaluation:
-    """A structure at given parameters: what is linear solved, and the way down."""
+    """A structure at given parameters: the linear parameters solved, and the next step."""
 
     def __init__(self, problem: Compressed, structure: Structure, theta: Real) -> None:
         self.problem, self.products = problem, problem.products
@@ -126,11 +114,11 @@ class _Evaluation:
         """Derivatives of the impulse response, shape (1 + order, taps)."""
         slopes = self.part.slopes(self.linear, np.empty(0))
         if self.problem.shortest_delay == self.problem.longest_delay:
-            slopes[0] = 0.0  # a delay that is kept
+            slopes[0] = 0.0  # the delay is fixed
         return slopes
 
     def _responses(self, rows: Real, *, constant: bool) -> Responses:
-        """Impulse responses of this structure; `constant` where the first answers 1 with 1."""
+        """Impulse responses of this structure; `constant` if the first has a gain of 1 at DC."""
         if self.part.structure.integrators:
             return Responses.integrating(rows)
         steady = np.zeros(rows.shape[0])
@@ -156,13 +144,13 @@ class _Evaluation:
         return turned - mixed @ solved(inner, mixed.T), left
 
     def fits(self, *, converged: bool) -> "list[Fit]":
-        """Where the way down ended."""
+        """The fit here."""
         return [self.stepped(np.zeros(self.part.theta.size), left=self.cost, converged=converged)]
 
     def stepped(self, step: Real, *, left: float, converged: bool) -> "Fitted":
-        """Return the fit one step away from here, as the derivatives predict it."""
+        """Return the fit one step away, as the derivatives predict it."""
         responses, moments, unknown = self.all_responses, self.all_moments, step.size
-        left = max(left, np.finfo(float).eps * moments.energy)  # it was foretold, not evaluated
+        left = max(left, np.finfo(float).eps * moments.energy)  # a prediction may be below 0
         linear = self.linear
         if step.any():
             inner, mixed = moments.gram[unknown:, unknown:], moments.gram[unknown:, :unknown]
@@ -191,81 +179,59 @@ class _Evaluation:
 
 @evaluating.register
 def _(
-    first: Compressed,
-    problems: Sequence[Problem],
-    structures: Sequence[Structure],
+    first: Compressed, problems: Sequence[Problem], structures: Sequence[Structure]
 ) -> Callable[[Sequence[Real]], _Evaluation]:
-    """By products of impulse responses."""
+    """Evaluate by products of impulse responses."""
     return lambda thetas: _Evaluation(first, structures[0], thetas[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LeftOver:
-    """What a fit leaves over, by samples and not whitened.
+class _Residual:
+    """The residual of a fit, not whitened."""
 
-    Parameters
-    ----------
-    power : float
-        Mean square.
-    counted : int
-        How many samples it is the mean of.
-    innovation : float
-        Mean square of what its past does not predict.
-    share : float
-        Independent samples per sample.
-    noise : ndarray, shape (order + 1,)
-        Autoregression, 1 first; 1 alone where it is white.
-    """
-
-    power: float
-    counted: int
-    innovation: float
-    share: float
-    noise: Real
+    power: float  # mean square
+    counted: int  # samples that `power` is the mean of
+    innovation: float  # mean square of the error with which its past predicts it
+    share: float  # independent samples per sample
+    noise: Real  # autoregression, 1 first; 1 alone where it is white
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted(Fit):
-    """Where a fit to products ended; it predicts no samples, and `cost` equals `objective`.
+    """A fit to products; it predicts no samples, and `cost` equals `objective`."""
 
-    Parameters
-    ----------
-    response : ndarray, shape (taps,)
-        Impulse response, less what it keeps.
-    weights : ndarray, shape (q,)
-        What multiplies `responses` in it: the last step, 0 where it was evaluated; the numerator.
-    responses : Responses
-        Derivatives of it by theta, then by the numerator.
-    moments : Moments
-        Products of derivatives by theta, then of the rows.
-    problem : Compressed
-        What was fitted to.
-    """
-
-    response: Real
+    response: Real  # (taps,): impulse response, less its final value
+    # (q,): factors of `responses` in it: the last step, 0 if its end was evaluated; the numerator
     weights: Real
-    responses: Responses
-    moments: Moments
-    problem: Compressed
+    responses: Responses  # derivatives of the impulse response by theta, then by the numerator
+    moments: Moments  # products of `responses`
+    problem: Compressed  # the data
 
     @property
     def products(self) -> Products:
-        """What was fitted to."""
+        """The data, under the noise model of the fit."""
         return self.problem.products
 
     @property
+    def whitening(self) -> Products:
+        """Products that whiten the residual."""
+        products = self.products
+        white = products.order or self.is_white
+        return products if white else products.whitened(self.left.noise)
+
+    @property
     def is_white(self) -> bool:
-        """Whether what is left over passes for white."""
+        """Whether the residual passes for white."""
         return self.left.noise.size == 1
 
     @property
     def is_steady(self) -> bool:
-        """Whether what is left over keeps its level: without samples nothing speaks against it."""
+        """Whether the residual keeps its level: assumed, since that cannot be tested here."""
         return True
 
     @property
     def share(self) -> float:
-        """Independent samples per sample of what is left over."""
+        """Independent samples per sample of the residual."""
         return self.left.share
 
     @property
@@ -276,12 +242,12 @@ class Fitted(Fit):
 
     @property
     def covariance(self) -> Real:
-        """Of theta, the numerator and the mean bias: the Cramér-Rao bound."""
+        """Covariance of theta, the numerator and the mean bias: the Cramér-Rao bound."""
         gram = self.moments.gram
         static, held = self.structure.name == "static", self.problem.source.degree == 0
         if (static and held) or steps_through(self.structure, held=held):
-            # The delay moves in whole samples only. If static, it is uniform over the sample in
-            # which it ends; otherwise figures are read at both ends of that sample.
+            # The delay moves in whole samples only. In a static model it is uniform over the sample
+            # in which it ends; otherwise figures are read at both ends of that sample.
             inverse = np.zeros_like(gram)
             inverse[1:, 1:] = inverted(gram[1:, 1:])
             inverse[0, 0] = 1.0 / (12.0 * self.variance) if static else 0.0
@@ -294,20 +260,20 @@ class Fitted(Fit):
         return np.asarray(whole * self.variance)
 
     @cached_property
-    def left_over(self) -> Remainder:
-        """What is left over, not whitened, as `Products.left_over` gives it."""
+    def remainder(self) -> Remainder:
+        """Products and ends of the residual, not whitened."""
         fixed = self.moments.fixed - self.moments.fixed_rows @ self.weights
         kept = float(self.responses.kept @ self.weights)
         return self.products.plain.left_over(self.response, kept, fixed)
 
     @cached_property
-    def left(self) -> LeftOver:
-        """Power, colour and autoregression of what is left over."""
+    def left(self) -> _Residual:
+        """Power, colour and autoregression of the residual."""
         products = self.products
-        gram, count = self.left_over.gram, self.left_over.counted
+        gram, count = self.remainder.gram, self.remainder.counted
         if gram[0, 0] <= _ROUNDED * products.plain.energy:
             least, noise = self.objective / products.counted, np.ones(1)
-            return LeftOver(power=least, counted=count, innovation=least, share=1.0, noise=noise)
+            return _Residual(power=least, counted=count, innovation=least, share=1.0, noise=noise)
         power = float(gram[0, 0])
         rho = gram[0, 1 : max(min(gram.shape[0], count // 4), 1)] / power
         lags = np.arange(1, rho.size + 1)
@@ -317,7 +283,7 @@ class Fitted(Fit):
         noise = np.ones(1) if white else whitening_filter(gram, count)
         if white and not products.order:
             power, count = self.objective, products.counted
-        return LeftOver(
+        return _Residual(
             power=power / count,
             counted=count,
             innovation=float(noise @ gram[: noise.size, : noise.size] @ noise) / count,
@@ -327,26 +293,17 @@ class Fitted(Fit):
 
 
 def as_fitted(fit: Fit) -> Fitted:
-    """Return a fit that was made to products as the `Fitted` that it is."""
+    """Narrow the type of a fit that was made to products."""
     if not isinstance(fit, Fitted):
         raise TypeError("the fit was made to samples, not to statistics")
     return fit
 
 
 def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
-    """Take a fit along to more samples of the same run.
+    """Update a fit to more samples of the same run, with a limited number of evaluations.
 
-    Where these move it by a fraction of its error bars, that is one step of Gauss and Newton. Where
-    it leads is foretold by the derivatives and not evaluated: it costs half of what it would.
-
-    Parameters
-    ----------
-    problem : Compressed
-        The samples so far.
-    fit : Fit
-        Of the samples before.
-    evaluations : int
-        How often the structure is evaluated at most, steps that lead nowhere included.
+    Where these samples move it by a fraction of its error bars, one step of Gauss and Newton is
+    enough. Its end is predicted by the derivatives and not evaluated, which halves the cost.
     """
     structure = fit.structure
     here = _Evaluation(problem, structure, fit.theta)
@@ -365,21 +322,21 @@ def follow(problem: Compressed, fit: Fit, *, evaluations: int) -> Fitted:
 def fit_briefly(
     problem: Compressed, structure: Structure, theta: Real, *, evaluations: int
 ) -> Fitted:
-    """Fit one structure from one start with at most so many evaluations."""
+    """Fit one structure from one start with a limited number of evaluations."""
     here = _Evaluation(problem, structure, bounded_for(problem, structure, theta))
     return _climbed(here, evaluations)
 
 
 def _climbed(here: _Evaluation, evaluations: int) -> Fitted:
-    """The way down from the first evaluation, which counts as one."""
+    """Iterate from the first evaluation, which counts as one."""
     problem, structure = here.problem, here.part.structure
-    seen: list[_Evaluation] = []
+    made: list[_Evaluation] = []
 
     def evaluated(thetas: Sequence[Real]) -> _Evaluation:
-        if len(seen) == evaluations:
+        if len(made) == evaluations:
             raise _SpentError
-        seen.append(_Evaluation(problem, structure, thetas[0]) if seen else here)
-        return seen[-1]
+        made.append(_Evaluation(problem, structure, thetas[0]) if made else here)
+        return made[-1]
 
     try:
         best, converged = climb(
@@ -392,5 +349,5 @@ def _climbed(here: _Evaluation, evaluations: int) -> Fitted:
             precision=_PRECISION,
         )
     except _SpentError:
-        best, converged = min(seen, key=lambda one: one.cost), False
+        best, converged = min(made, key=lambda evaluation: evaluation.cost), False
     return as_fitted(best.fits(converged=converged)[0])

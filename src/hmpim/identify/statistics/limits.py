@@ -1,4 +1,4 @@
-"""What statistics alone do not tell apart: drift and noise, a window and a memory, software."""
+"""Cases that statistics alone cannot distinguish: drift or noise, a long response, software."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,9 +24,9 @@ _SLOWEST = 1e-7
 
 
 def drift_or_noise(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt a noise most of which is slower than the window: it is no other than a drifting bias.
+    """Doubt a noise that is mostly slower than the window, as a drifting bias would be.
 
-    By the autoregression of what is left over.
+    The autoregression of the residual gives its spectrum.
     """
     fit = as_fitted(evidence.joint.best.fit)
     lags = fit.products.statistics.lags
@@ -47,7 +47,7 @@ def drift_or_noise(evidence: Evidence) -> Iterator[Finding]:
 
 
 def cut_response(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt what the impulse response beyond the window moves: that counts as noise.
+    """Doubt figures where the impulse response beyond the window counts as noise.
 
     The response is continued for a second window, and its power compared with the noise's.
     """
@@ -75,8 +75,8 @@ def cut_response(evidence: Evidence) -> Iterator[Finding]:
 def perhaps_software(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the timing of one pole behind a held input, without noise: it may be a filter.
 
-    From samples the plainer of both is chosen; what they leave over differs by rounding, which
-    products do not keep.
+    From samples the plainer of both is chosen. Their residuals differ by rounding, which products
+    do not keep.
     """
     fit = evidence.joint.best.fit
     held = evidence.joint.best.intersample == "zoh"

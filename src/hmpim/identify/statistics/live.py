@@ -1,4 +1,4 @@
-"""The estimate so far, while samples come."""
+"""The estimate so far, while samples arrive."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ from hmpim.identify.result import Identification, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.fit import Compressed, Fitted, fit_briefly, follow, pulse
-from hmpim.identify.statistics.misfit import Asked, asked_of, misfit_of
+from hmpim.identify.statistics.misfit import Probes, misfit_of, probes_at
 from hmpim.identify.statistics.products import Products
 from hmpim.identify.statistics.reach import Reach
 from hmpim.identify.statistics.run import shortened
@@ -42,15 +42,15 @@ _PAUSE = 1.1
 """Growth of the record before another new start is tried."""
 
 _EVALUATIONS, _FEWER = 2, 1
-"""Of the fit, at each look: where it is and a step from there; at a look that asks whether the
-residual follows the input, where it is alone."""
+"""Evaluations of the fit at each look: where it is and a step from there. At a look that tests
+whether the residual follows the input, there is no step."""
 
 _TASTE, _FARTHER = 4, 12
 """Evaluations at a new start: from each starting value, and then from the best of them. A structure
 that needs more is hardly determined by the record yet; later looks continue it."""
 
 _BETWEEN = 1.05
-"""Growth of the record before it is asked again whether the residual follows the input."""
+"""Growth of the record before the residual is tested again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,10 +62,10 @@ class Look:
     time : float
         Seconds read.
     structure : str
-        What was fitted.
+        The fitted structure.
     parameters : Parameters
-        Doubtful where the residual still follows the input, where a frequency is below one over
-        the time so far, or where it lies beyond what was excited.
+        Doubtful if the residual still follows the input, or if the natural frequency is below one
+        over the time so far or beyond the excited band.
     """
 
     time: float
@@ -76,14 +76,14 @@ class Look:
 class LiveEstimator:
     """Estimate while a stimulus is played: the estimate so far, with its error bars.
 
-    The output begins at rest. Each block is added to the statistics of the run; the fit goes on
-    from where it was. A new start is made at the first look and whenever the residual follows
-    the input.
+    The output begins at rest. Each block is added to the statistics of the run, and the fit
+    continues from its last state. A new start is made at the first look and whenever the residual
+    follows the input.
 
     Parameters
     ----------
     stimulus : Stimulus
-        What is played: its rate and its band are used.
+        The stimulus: its rate and its band are used.
     window : float
         Seconds that delay and settling may take together.
     intersample : {'zoh', 'foh', 'bandlimited'}
@@ -121,32 +121,31 @@ class LiveEstimator:
             )
         self._statistics = Statistics(
             fs=stimulus.fs,
-            reach=Reach(lags=lags, beyond=False),  # a look has no time for it
+            reach=Reach(lags=lags, beyond=False),  # a look has no time for cubes
             runs=(),
-            units=("", ""),  # that of the output is unknown
             intersample=intersample,
             band=stimulus.waveform.band,
         )
         low, high = self._statistics.band or (0.0, stimulus.fs / 2)
         self._highest = high
-        self._band = low / stimulus.fs, high / stimulus.fs  # cycles a sample that are excited
+        self._band = low / stimulus.fs, high / stimulus.fs  # excited, in cycles per sample
         self._mode: Intersample = intersample
         self._pulse = pulse(self._statistics.reach, intersample)
         self._fitted: Fitted | None = None
-        self._tried = self._asked = self._starts = 0
+        self._started_at = self._tested_at = self._starts = 0  # samples at the last start and test
         self._follows = True
-        self._asked_last = self._made = False
-        self._asks: Asked | None = None
+        self._tested_last = self._probed_last = False
+        self._probes: Probes | None = None
         self._look: Look | None = None
 
     @property
     def starts(self) -> int:
-        """How often a new start was made; it takes longer than other updates do."""
+        """Number of new starts, which take longer than other updates."""
         return self._starts
 
     @property
     def statistics(self) -> Statistics:
-        """All that was read, compressed."""
+        """All samples so far, compressed."""
         return self._statistics
 
     def update(self, u: ArrayLike, y: ArrayLike) -> Look | None:
@@ -160,7 +159,7 @@ class LiveEstimator:
         Returns
         -------
         Look or None
-            None while there is too little to fit.
+            None while there are too few samples to fit.
         """
         if not any(np.size(numbers_of(name, given)) for name, given in (("u", u), ("y", y))):
             return self._look
@@ -168,7 +167,7 @@ class LiveEstimator:
         return self.look()
 
     def read(self, u: ArrayLike, y: ArrayLike) -> None:
-        """Read the samples that follow, without a look: that costs next to nothing.
+        """Read the samples that follow, without a look; this takes almost no time.
 
         Parameters
         ----------
@@ -178,7 +177,7 @@ class LiveEstimator:
         self._statistics.update(u, y)
 
     def look(self) -> Look | None:
-        """Look at what was read so far; None while there is too little to fit."""
+        """Return the estimate so far; None while there are too few samples to fit."""
         statistics = self._statistics
         if not statistics.runs:
             return None
@@ -186,66 +185,63 @@ class LiveEstimator:
         if statistics.samples < _FEWEST or not moves:
             return None
         problem = Compressed.of(Products(statistics, skipped=0), self._pulse)
-        due = statistics.samples >= _BETWEEN * self._asked and not self._asked_last
-        made = due and self._is_elsewhere(self._fitted)
-        asks = due and not made
-        evaluations = _FEWER if due else _EVALUATIONS
-        before = self._fitted
-        fitted = (
-            self._begin(problem)
-            if before is None
-            else follow(problem, before, evaluations=evaluations)
-        )
-        if made:  # and asked at the next look, since each takes long enough
-            self._asks = self._asked_about(fitted)
-        if asks or self._fitted is None:
-            self._asked = statistics.samples
-            self._follows = self._lacks(fitted)
-            if self._follows and statistics.samples >= _PAUSE * self._tried:
+        due = statistics.samples >= _BETWEEN * self._tested_at and not self._tested_last
+        probed = due and self._has_moved()
+        tested = due and not probed
+        first, evaluations = self._fitted is None, _FEWER if due else _EVALUATIONS
+        if self._fitted is None:
+            fitted = self._begin(problem)
+        else:
+            fitted = follow(problem, self._fitted, evaluations=evaluations)
+        if probed:  # the test follows at the next look, since both take long
+            self._probes = self._probes_about(fitted)
+        if tested or first:
+            self._tested_at = statistics.samples
+            self._follows = self._residual_follows(fitted)
+            if self._follows and statistics.samples >= _PAUSE * self._started_at:
                 fitted = self._begin(problem)
-                self._asks = self._asked_about(fitted)
-                self._follows = self._lacks(fitted)
-        self._asked_last, self._made = asks, made
+                self._probes = self._probes_about(fitted)
+                self._follows = self._residual_follows(fitted)
+        self._tested_last, self._probed_last = tested, probed
         self._fitted = fitted
-        time = statistics.samples / statistics.fs
-        parameters = _figures(fitted, statistics)
-        self._look = Look(
-            time=time,
-            structure=fitted.structure.name,
-            parameters=_doubted(parameters, time, self._highest, follows=self._follows),
-        )
+        time, parameters = statistics.samples / statistics.fs, _figures(fitted, statistics)
+        natural = parameters.natural_frequency
+        outside = natural is not None and not 1.0 / time < natural.value < PAST * self._highest
+        if self._follows or outside:
+            parameters = all_doubtful(parameters)
+        self._look = Look(time=time, structure=fitted.structure.name, parameters=parameters)
         return self._look
 
-    def _is_elsewhere(self, fitted: Fitted | None) -> bool:
-        """Whether a fit's delay has moved away from what is asked for, made before this look."""
-        if fitted is None or self._asks is None or self._made:
+    def _has_moved(self) -> bool:
+        """Whether the delay of the fit has moved away from probes that are older than a look."""
+        if self._fitted is None or self._probes is None or self._probed_last:
             return False
-        return abs(self._asks.delay - fitted.delay) * self._band[1] > FEW
+        return abs(self._probes.delay - self._fitted.delay) * self._band[1] > FEW
 
-    def _asked_about(self, fitted: Fitted) -> Asked:
-        return asked_of(fitted.delay, self._band, fitted.products)
+    def _probes_about(self, fitted: Fitted) -> Probes:
+        return probes_at(fitted.delay, self._band, fitted.products)
 
-    def _lacks(self, fitted: Fitted) -> bool:
-        """Whether what is left over follows the input."""
-        if self._asks is None:
-            self._asks = self._asked_about(fitted)
-        misfit = misfit_of(fitted, fitted.products, self._band, asked=self._asks)
+    def _residual_follows(self, fitted: Fitted) -> bool:
+        """Whether the residual follows the input."""
+        if self._probes is None:
+            self._probes = self._probes_about(fitted)
+        misfit = misfit_of(fitted, fitted.products, self._band, self._probes)
         return misfit.probability < FALSE_ALARM
 
     def identification(self) -> Identification:
-        """The whole identification of what was read, with every structure and every check."""
+        """The whole identification of all samples so far, with every structure and every check."""
         return identify_statistics(self._statistics, intersample=self._mode)
 
     def _begin(self, problem: Compressed) -> Fitted:
         """A new start: every plain structure from the data alone."""
-        self._tried = self._statistics.samples
+        self._started_at = self._statistics.samples
         self._starts += 1
         fit = _begun(self._statistics, self._mode)
         return follow(problem, fit, evaluations=_EVALUATIONS)
 
 
 def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
-    """The parameters themselves; what is read off the response costs more than a look may take."""
+    """The parameters themselves; a look has no time to read figures off the response."""
     vector = np.concatenate([fitted.theta, fitted.linear])
     freedom = max(fitted.products.counted - vector.size, 1)
     unit = statistics.units[1]
@@ -262,20 +258,11 @@ def _figures(fitted: Fitted, statistics: Statistics) -> Parameters:
     return parameters
 
 
-def _doubted(parameters: Parameters, time: float, highest: float, *, follows: bool) -> Parameters:
-    """Nothing is claimed below 1/time, beyond the band, or while the residual follows the input."""
-    natural = parameters.natural_frequency
-    outside = natural is not None and not 1.0 / time < natural.value < PAST * highest
-    if not (follows or outside):
-        return parameters
-    return all_doubtful(parameters)
-
-
 def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
-    """The likeliest plain structure, of one run from rest; its noise is taken for white.
+    """The likeliest plain structure for one run from rest, with white noise.
 
-    This is the joint fit's search in little time: a few steps from each start, and a few more from
-    the best one of each structure. A fit that has not converged then continues at later looks.
+    This is a short form of the joint fit's search: a few steps from each start, and a few more from
+    the best start of each structure. A fit that has not converged continues at later looks.
     """
     short = only_told(statistics)
     problem = Compressed.of(Products(short, skipped=0), pulse(short.reach, intersample))
@@ -283,9 +270,9 @@ def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
     fits: list[Fitted] = []
     for structure in (STRUCTURES[name] for name in PLAIN):
         starts = starting_values(rough, structure)
-        if structure.order == 2:  # it is a first-order one too
+        if structure.order == 2:  # the first-order fit is a special case
             starts.append(nested(fits[-1]))
-        tried = [fit_briefly(problem, structure, one, evaluations=_TASTE) for one in starts]
+        tried = [fit_briefly(problem, structure, start, evaluations=_TASTE) for start in starts]
         best = min(tried, key=lambda fit: fit.objective)
         if not best.converged:
             best = fit_briefly(problem, structure, best.theta, evaluations=_FARTHER)
@@ -295,7 +282,7 @@ def _begun(statistics: Statistics, intersample: Intersample) -> Fit:
 
 
 def only_told(statistics: Statistics) -> Statistics:
-    """The same without lags longer than the run, which says nothing about them."""
+    """Statistics without the lags that are longer than the run."""
     reach = replace(statistics.reach, lags=min(statistics.lags, statistics.samples))
     runs = tuple(shortened(run, reach) for run in statistics.runs)
     return replace(statistics, reach=reach, runs=runs)

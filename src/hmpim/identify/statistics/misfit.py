@@ -1,8 +1,8 @@
-"""Whether what a model leaves over still follows the input: a score test, from statistics alone.
+"""Whether the residual of a model still follows the input: a score test, from statistics alone.
 
-Short responses of their own, one pair (cosine and sine) for each of several frequencies across the
-excited band, are asked for beside all parameters of the model (C. R. Rao, Proc. Camb. Phil. Soc.
-44, 1948). Under a right model what they gain is chi-squared.
+The test adds short responses to all parameters of the model, a cosine and a sine for each of
+several frequencies across the excited band (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948). Under a
+right model their gain is chi-squared.
 """
 
 from dataclasses import dataclass
@@ -18,20 +18,21 @@ from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
 
-__all__ = ["Asked", "asked_of", "hidden_pole_of", "misfit_of"]
+__all__ = ["Probes", "explained_by", "hidden_pole_of", "misfit_of", "probes_at"]
 
 _GROUPS = 12
-"""Frequencies that are asked for."""
+"""Frequencies that are tested."""
 
 _SEEN = 1e-6
-"""Share of a direction that the model's own parameters leave, below which it is not asked for."""
+"""Share of the greatest direction, below which the model's parameters explain a direction and it is
+not tested."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Asked:
-    """Responses that are asked for about a delay, in samples, made once for several looks at a run.
+class Probes:
+    """Responses that are tested, (2 groups, taps), about a delay in samples, and their transforms.
 
-    `rows` has shape (2 groups, taps); `transforms` are theirs, for products without a noise model.
+    They are made once for several looks at a run; the transforms are without a noise model.
     """
 
     delay: float
@@ -39,10 +40,10 @@ class Asked:
     transforms: Complex
 
 
-def asked_of(
+def probes_at(
     delay: float, band: tuple[float, float], products: Products, *, groups: int = _GROUPS
-) -> Asked:
-    """Cosines and sines behind a window about a delay, in samples; `band` as for `misfit_of`."""
+) -> Probes:
+    """Cosines and sines within a window about a delay in samples; the band is as in `misfit_of`."""
     (low, high), taps = band, products.statistics.reach.taps
     lag = np.arange(taps) - AHEAD - delay
     width = groups / max(high - low, 1e-9)
@@ -52,70 +53,66 @@ def asked_of(
     centres = low + (high - low) * (np.arange(groups) + 0.5) / groups
     phase = 2 * np.pi * np.outer(centres, lag)
     rows = np.vstack([np.cos(phase), np.sin(phase)]) * window
-    return Asked(delay=delay, rows=rows, transforms=products.transform(rows))
+    return Probes(delay=delay, rows=rows, transforms=products.transform(rows))
 
 
 def misfit_of(
-    fitted: Fitted, products: Products, band: tuple[float, float], *, asked: Asked | None = None
+    fitted: Fitted, products: Products, band: tuple[float, float], probes: Probes
 ) -> Misfit:
     """Test whether the residual of a fit is still coherent with the input.
 
-    Parameters
-    ----------
-    fitted : Fitted
-        The fit.
-    products : Products
-        With what the fit leaves over whitened, so that its colour does no harm.
-    band : (float, float)
-        Excited band, in cycles per sample.
-    asked : Asked, optional
-        What is asked for, where it is known already: about the fit's own delay by default.
+    The products are those that whiten the residual, so that its colour does not matter; the excited
+    band is in cycles per sample.
     """
-    if asked is None:
-        asked = asked_of(fitted.delay, band, products)
-    gain, left, cost, *_ = _beside(fitted, products, asked.rows, asked.transforms)
-    variance = cost / max(products.counted - fitted.weights.size - 1, 1)
+    gain, left, cost, *_ = _in_addition(fitted, products, probes.rows, probes.transforms)
     power_left = np.diag(left)
     size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
     values, vectors = np.linalg.eigh(left / np.outer(size, size))
     kept = values > _SEEN * values[-1]
-    projected = (vectors.T @ (gain / size))[kept]
-    power = float(np.sum(projected**2 / values[kept]))
-    freedom = int(kept.sum())
-    beyond = (power - freedom * variance) / cost
+    explained = (vectors.T @ (gain / size))[kept] ** 2 / values[kept]
+    return explained_by(explained, cost, products.counted - fitted.weights.size - 1)
+
+
+def explained_by(explained: Real, cost: float, freedom: int) -> Misfit:
+    """Compare the power that each of several directions explains, (k,), with the noise's.
+
+    `cost` is the sum of squares of the residual, and `freedom` its degrees of freedom.
+    """
+    variance, power = cost / max(freedom, 1), float(np.sum(explained))
     return Misfit(
-        share=max(beyond, 0.0), probability=float(scipy.special.chdtrc(freedom, power / variance))
+        share=max((power - explained.size * variance) / cost, 0.0),
+        probability=float(scipy.special.chdtrc(explained.size, power / variance)),
     )
 
 
 def hidden_pole_of(fitted: Fitted) -> HiddenPole:
-    """Test a fit for one more pole, the delay shortened by as much.
+    """Test a fit for one more pole, the delay shortened by its time constant, from statistics.
 
-    As `hmpim.identify.fitting.growth.hidden_pole`, from statistics. Of a pole's response that the
-    model's own parameters imitate, products keep rounding alone.
+    This is `hmpim.identify.fitting.growth.hidden_pole` without samples. Where the model's own
+    parameters imitate the response of a pole, the products contain rounding alone.
     """
     row = response_to_square(fitted.problem, fitted)
-    gain, left, _, shift, whole = _beside(fitted, fitted.products, row[None])
+    gain, left, _, shift, whole = _in_addition(fitted, fitted.products, row[None])
     size = max(float(left[0, 0]), UNSEEN * float(whole[0]), np.finfo(float).tiny)
     return HiddenPole(
         squared=float(gain[0]) / size,
         std=float(np.sqrt(fitted.variance / size)),
-        shift=np.append(shift[:, 0], 0.0),  # the bias is solved apart
+        shift=np.append(shift[:, 0], 0.0),  # the bias is solved separately
         fit=fitted,
     )
 
 
-def _beside(
-    fitted: Fitted, products: Products, asked: Real, known: Complex | None = None
+def _in_addition(
+    fitted: Fitted, products: Products, rows: Real, known: Complex | None = None
 ) -> tuple[Real, Real, float, Real, Real]:
     """Try more responses in addition to a model.
 
     Returns their products with the residual, the products among them with the model's own rows
     projected out, the residual's power, how theta and the numerator change with their weights, and
-    their power before anything was projected out.
+    their power before the projection.
     """
-    count = asked.shape[0]
-    both = Responses.ending(asked, asked.sum(axis=1)).and_also(fitted.responses)
+    count = rows.shape[0]
+    both = Responses.ending(rows, rows.sum(axis=1)).and_also(fitted.responses)
     moments = products.moments(both, known=known)
     linear, mixed = fitted.weights, moments.gram[:count, count:]
     shift = -solved(moments.gram[count:, count:], mixed.T)

@@ -1,9 +1,9 @@
-"""Products of what filters make of an input, over the samples that count, from statistics alone.
+"""Products of filtered inputs over the samples that count, from statistics alone.
 
 With F the impulse responses, whitened or not, and R the Toeplitz matrix of the input's
-autocorrelation, F R Fᵀ are the products of the full convolutions. Those samples of them that do not
-count lie at the two ends of each run, where the input itself is kept: they are made and taken off.
-The bias is solved for each run, or for all, and taken off too.
+autocorrelation, F R Fᵀ are the products of the full convolutions. The samples that do not count lie
+at the two ends of each run, where the input itself is kept: they are computed and subtracted. The
+bias is solved for each run, or for all, and subtracted too.
 """
 
 from dataclasses import dataclass
@@ -22,37 +22,27 @@ from hmpim.identify.statistics.statistics import Statistics
 __all__ = ["Moments", "Products", "Remainder", "Responses", "spectrum_of"]
 
 _FEW = 64
-"""Samples at the beginning up to which a convolution is sooner a product with a matrix."""
+"""Samples at the beginning up to which a convolution is faster as a product with a matrix."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
-    """Impulse responses that come to rest, at 0 or, of an integrator, at a value that they keep.
+    """Impulse responses that end at 0 or, for an integrator, at another final value."""
 
-    Parameters
-    ----------
-    rows : ndarray, shape (q, taps)
-        From `AHEAD` samples before the input on, from it on less what they keep.
-    steady : ndarray, shape (q,)
-        What `rows` make of a constant input of 1.
-    kept : ndarray, shape (q,)
-        What they keep, which multiplies the running sum of the input.
-    """
-
-    rows: Real
-    steady: Real
-    kept: Real
+    rows: Real  # (q, taps): from `AHEAD` samples before the input; later, less the final value
+    steady: Real  # (q,): response of `rows` to a constant input of 1
+    kept: Real  # (q,): the final values, which multiply the running sum of the input
 
     @classmethod
     def integrating(cls, rows: Real) -> "Responses":
-        """Those of an integrator, the last sample of which they keep."""
+        """Responses of an integrator, with the last sample as the final value."""
         kept, rows = rows[:, -1].copy(), rows.copy()
         rows[:, AHEAD:] -= kept[:, None]
         return cls(rows=rows, steady=rows.sum(axis=1), kept=kept)
 
     @classmethod
     def ending(cls, rows: Real, steady: Real) -> "Responses":
-        """Those that end at 0."""
+        """Responses that end at 0."""
         return cls(rows=rows, steady=steady, kept=np.zeros(steady.size))
 
     def and_also(self, others: "Responses") -> "Responses":
@@ -66,56 +56,29 @@ class Responses:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Moments:
-    """Products of rows and output, the bias solved and taken off.
+    """Products of rows and output, with the bias solved and subtracted.
 
-    Parameters
-    ----------
-    gram : ndarray, shape (q, q)
-        Of the rows.
-    cross : ndarray, shape (q,)
-        Of rows and output.
-    energy : float
-        Of the output.
-    fixed, fixed_rows : ndarray, shape (runs, rows of the bias) and (…, q)
-        What multiplies the rows of each run's bias is `fixed` less `fixed_rows` times what
-        multiplies the rows.
-    bias : float
-        Mean bias of all runs, without what the rows bring to it.
-    bias_rows : ndarray, shape (q,)
-        What each row takes from it.
-    bias_variance : float
-        Of `bias`, for noise of variance 1.
+    With `weights` the coefficients of the rows, the coefficients of each run's bias are
+    ``fixed - fixed_rows @ weights``, and the mean bias is ``bias - bias_rows @ weights``.
     """
 
-    gram: Real
-    cross: Real
-    energy: float
-    fixed: Real
-    fixed_rows: Real
+    gram: Real  # (q, q): of the rows
+    cross: Real  # (q,): of rows and output
+    energy: float  # of the output
+    fixed: Real  # (runs, rows of the bias)
+    fixed_rows: Real  # (runs, rows of the bias, q)
     bias: float
-    bias_rows: Real
-    bias_variance: float
+    bias_rows: Real  # (q,)
+    bias_variance: float  # of `bias`, for noise of variance 1
 
 
 class Remainder(NamedTuple):
-    """What a model leaves over, not whitened.
+    """The residual of a model, not whitened."""
 
-    Parameters
-    ----------
-    gram : ndarray, shape (LONGEST + 1, LONGEST + 1)
-        Sums of products of a sample and those 1 … LONGEST before, of samples that count.
-    counted : int
-        Of how many.
-    heads : ndarray, shape (runs, m)
-        The first samples of each run, as if it had begun at rest.
-    tails : ndarray, shape (runs, LONGEST)
-        Its last samples.
-    """
-
-    gram: Real
-    counted: int
-    heads: Real
-    tails: Real
+    gram: Real  # (LONGEST + 1)²: sums of products of a sample that counts and those before it
+    counted: int  # samples that count
+    heads: Real  # (runs, m): first samples of each run, as if it had begun at rest
+    tails: Real  # (runs, LONGEST): its last samples
 
 
 class Products:
@@ -126,13 +89,13 @@ class Products:
     statistics : Statistics
         What was read.
     skipped : int
-        First outputs of each run that do not count, since they answer what came before it, at most
+        First outputs of each run that do not count, since they depend on earlier input, at most
         `lags`; 0 where each run begins at rest.
     noise : ndarray, shape (order + 1,)
         Autoregression of the noise, 1 first.
     to_the_end : bool
         Whether the last `AHEAD` outputs of each run count. A band-limited input is continued there,
-        odd about its last sample; one that ends in motion rings about it.
+        odd about its last sample; an input that ends in motion rings there.
     """
 
     def __init__(
@@ -149,7 +112,7 @@ class Products:
         reach = statistics.reach
         self.order = self.noise.size - 1
         self.first = self.order + skipped
-        """Sample of a run from which on its whitened outputs count."""
+        """First sample of a run whose whitened output counts."""
         self._levels = np.array([run.level for run in statistics.runs])
         self._length = int(scipy.fft.next_fast_len(2 * reach.span + 1, real=True))
         runs = statistics.runs
@@ -170,9 +133,11 @@ class Products:
             slice(reach.span, reach.span + reach.taps + self.order),
         )
         """Samples of a full convolution with the head that do not count; with the tail."""
-        heads = [run.head_u[: self.first + AHEAD] for run in runs]
-        few = self._apart[0].stop <= min(_FEW, reach.taps)
-        self._begun = np.stack([_moved(head) for head in heads]) if few else None
+        self._begun: Real | None = None
+        """Matrices that turn the first samples of a response into those of a convolution."""
+        if self._apart[0].stop <= min(_FEW, reach.taps):
+            heads = [run.head_u[: self.first + AHEAD] for run in runs]
+            self._begun = np.stack([scipy.linalg.toeplitz(u, 0.0 * u).T for u in heads])
         parts = [self._around[i::2, :, apart] for i, apart in enumerate(self._apart)]
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
@@ -183,7 +148,7 @@ class Products:
 
     @property
     def plain(self) -> "Products":
-        """The same, the noise taken for white."""
+        """The same with white noise."""
         return self if self._plain is None else self._plain
 
     def whitened(self, noise: Real) -> "Products":
@@ -201,7 +166,7 @@ class Products:
         skipped: int | None = None,
         noise: Real | None = None,
     ) -> "Products":
-        """The same but for what is given."""
+        """The same with other statistics, another number of skipped outputs, or another noise."""
         return Products(
             self.statistics if statistics is None else statistics,
             skipped=self.skipped if skipped is None else skipped,
@@ -216,7 +181,7 @@ class Products:
 
     @cached_property
     def energy(self) -> float:
-        """Sum of squares of the outputs that count, the bias taken off."""
+        """Sum of squares of the outputs that count, without the bias."""
         nothing = np.zeros((len(self._runs), 0, self._others.size))
         return self._without_bias(np.zeros((0, 0)), nothing, np.zeros(0)).energy
 
@@ -224,27 +189,27 @@ class Products:
         """Products of whitened outputs and the whitened input at each tap, (rows + 2, taps)."""
         reach, order = self.statistics.reach, self.order
         once = np.zeros((run.vu.shape[0], reach.taps + order))
+        out = np.zeros((run.vu.shape[0], reach.taps))
         # Σ aᵢ Σ v(t-i) u(t-j), j from -AHEAD to lags + order
         for i, a in enumerate(self.noise):
             start = reach.forth - AHEAD - i
             once += a * run.vu[:, start : start + once.shape[1]]
-        out = np.zeros((run.vu.shape[0], reach.taps))
         for i, a in enumerate(self.noise):
             out += a * once[:, i : i + reach.taps]
         return out
 
     def _outputs(self, run: Run) -> Real:
-        """Products of whitened outputs, of the whole run, (rows + 2)²."""
+        """Products of whitened outputs over the whole run, (rows + 2)²."""
         weight = np.correlate(self.noise, self.noise, "full")[self.order :]
         later = run.vv[:, :, 1 : weight.size] @ weight[1:]
         return np.asarray(weight[0] * run.vv[:, :, 0] + later + later.T)
 
     def _ends_of(self, run: Run, read: Run) -> list[tuple[Real, Real]]:
-        """Input at either end of a run, and whitened outputs there, 0 beyond what was `read`."""
+        """Input at either end of a run, and whitened outputs there, 0 beyond the run as `read`."""
         reach, beyond = self.statistics.reach, run.samples - read.samples
         n, span, count = run.samples, reach.span, reach.rows + 2
-        # Sample c of a convolution with the head is sample c - AHEAD of the run, and of one with
-        # the tail n - span - AHEAD + c.
+        # Sample c of a convolution with the head is sample c - AHEAD of the run; with the tail it
+        # is sample n - span - AHEAD + c.
         head, tail = (np.zeros((count, self._length)) for _ in range(2))
         size = min(reach.back, n)
         begins = np.cumsum(run.head_u[:size] + run.level[0])
@@ -267,18 +232,13 @@ class Products:
         return out
 
     def transform(self, rows: Real) -> Complex:
-        """Transforms of impulse responses, (q, taps), whitened: those that `moments` asks for."""
+        """Transforms of impulse responses, (q, taps), whitened, as `moments` takes them."""
         return np.asarray(scipy.fft.rfft(rows, self._length) * self._white)
 
     def moments(self, responses: Responses, *, known: Complex | None = None) -> Moments:
-        """Products of what impulse responses make of the input.
+        """Products of the input, filtered by impulse responses, and the output.
 
-        Parameters
-        ----------
-        responses : Responses
-            The impulse responses.
-        known : complex ndarray, optional
-            Transforms of the first rows, from `transform`.
+        `known` are the transforms of the first rows, from `transform`.
         """
         rows, kept = responses.rows, responses.kept
         if known is None:
@@ -300,18 +260,11 @@ class Products:
     def across(
         self, responses: Responses, other: "Products", others: Responses, lags: Real
     ) -> Real:
-        """Products with what other responses make of another input of the same runs.
+        """Products of this input, filtered, and another input of the same runs, filtered.
 
-        Each run has a bias of its own, and no response keeps a value.
-
-        Parameters
-        ----------
-        responses, others : Responses
-            To this input, and to the other one.
-        other : Products
-            Of the other input, the same outputs and noise.
-        lags : ndarray, shape (2 span + 1,)
-            Σ x(t) z(t-k), k from -span on, x this input and z the other.
+        Each run has its own bias, and all responses end at 0. The outputs and the noise of both are
+        the same; `lags`, (2 span + 1,), are Σ x(t) z(t-k), k from -span on, x this input and z the
+        other.
         """
         span = self.statistics.reach.span
         ours, theirs = self.transform(responses.rows), other.transform(others.rows)
@@ -321,9 +274,9 @@ class Products:
         apart = self._not_counted(responses.rows, ours)
         beyond = other._not_counted(others.rows, theirs)
         flat = apart.reshape(len(ours), -1) @ beyond.reshape(len(theirs), -1).T
-        told, beside = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
+        first, second = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
         inner = self._unsummed[:, :-1, :-1]
-        return np.asarray(whole - flat - np.sum(told.transpose(0, 2, 1) @ inner @ beside, axis=0))
+        return np.asarray(whole - flat - np.sum(first.transpose(0, 2, 1) @ inner @ second, axis=0))
 
     def _not_counted(self, rows: Real, spectra: Complex) -> Real:
         """Samples at the ends of each run that do not count, (q, runs, samples)."""
@@ -340,16 +293,10 @@ class Products:
         return np.concatenate([early, late], axis=2)
 
     def left_over(self, response: Real, kept: float, bias: Real) -> Remainder:
-        """Return what a model leaves over; of products without a noise model only.
+        """Return the residual of a model; for products without a noise model only.
 
-        Parameters
-        ----------
-        response : ndarray, shape (taps,)
-            Impulse response, less what it keeps.
-        kept : float
-            What it keeps.
-        bias : ndarray, shape (runs, rows)
-            What multiplies the rows of each run's bias.
+        The model has an impulse response, (taps,), less its final value, that value `kept`, and
+        coefficients of each run's bias, (runs, rows).
         """
         runs, reach, index = self._runs, self.statistics.reach, np.arange(LONGEST + 1)
         weights = np.hstack([-bias, np.tile([-kept, 1.0], (len(runs), 1))])
@@ -377,46 +324,46 @@ class Products:
         return Remainder(gram, count, ends[0::2, AHEAD:], ends[1::2, last - LONGEST : last])
 
     def _without_bias(self, gram: Real, mixed: Real, steady: Real) -> Moments:
-        """Solve the biases and take them off."""
+        """Solve the biases and subtract them."""
         statistics = self.statistics
         inner, outer = self._unsummed[:, :-1, :-1], self._unsummed[:, :-1, -1]
         energy = float(self._unsummed[:, -1, -1].sum())
-        beside, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
+        with_bias, cross = mixed[:, :, :-1], mixed[:, :, -1].sum(axis=0)
         if statistics.bias == "common":
             u, y = self._levels.T
-            weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], beside[:, :, 0]
+            weight, with_y, with_rows = inner[:, 0, 0], outer[:, 0], with_bias[:, :, 0]
             first = np.outer(steady, u @ with_rows)
             gram = gram + first + first.T + u**2 @ weight * np.outer(steady, steady)
             cross = cross + steady * (u @ with_y) + y @ with_rows + steady * (u * y @ weight)
             energy += float(2 * y @ with_y + y**2 @ weight)
-            beside = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
+            with_bias = (with_rows + np.outer(u * weight, steady)).sum(axis=0)[None, :, None]
             outer = (with_y + y * weight).sum()[None, None]
             inner = weight.sum()[None, None, None]
         if inner.shape[1] == 1:
             solved = np.divide(1.0, inner, out=np.zeros_like(inner), where=inner > 0.0)
         else:
             solved = np.linalg.pinv(inner, hermitian=True)
-        beside = beside.transpose(0, 2, 1)  # (runs, rows of the bias, q)
-        told = solved @ beside
+        with_bias = with_bias.transpose(0, 2, 1)  # (runs, rows of the bias, q)
+        fixed_rows = solved @ with_bias
         fixed = (solved @ outer[:, :, None])[:, :, 0]
         average, levels = self._average[:, None], self._levels
-        bias = (average @ fixed[:, :, None])[:, 0, 0]
-        taken = (average @ told)[:, 0]
-        if statistics.bias == "common":
-            each = fixed[0] - levels[:, 1:]
-            each_rows = (told[0] - levels[:, :1] * steady)[:, None]
-        else:
-            each, each_rows = fixed, told
-            bias, taken = bias + levels[:, 1], taken + levels[:, :1] * steady
+        bias, bias_rows = (average @ fixed[:, :, None])[:, 0, 0], (average @ fixed_rows)[:, 0]
         count, left = bias.size, energy - float((fixed * outer).sum())
+        gram = gram - (fixed_rows.transpose(0, 2, 1) @ with_bias).sum(axis=0)
+        cross = cross - (fixed[:, None] @ with_bias)[:, 0].sum(axis=0)
+        if statistics.bias == "common":
+            fixed = fixed[0] - levels[:, 1:]
+            fixed_rows = (fixed_rows[0] - levels[:, :1] * steady)[:, None]
+        else:
+            bias, bias_rows = bias + levels[:, 1], bias_rows + levels[:, :1] * steady
         return Moments(
-            gram=gram - (told.transpose(0, 2, 1) @ beside).sum(axis=0),
-            cross=cross - (fixed[:, None] @ beside)[:, 0].sum(axis=0),
-            energy=max(left, np.finfo(float).eps * abs(energy)),  # of sums that cancel
-            fixed=each,
-            fixed_rows=each_rows,
+            gram=gram,
+            cross=cross,
+            energy=max(left, np.finfo(float).eps * abs(energy)),  # sums may cancel
+            fixed=fixed,
+            fixed_rows=fixed_rows,
             bias=float(bias.sum()) / count,
-            bias_rows=taken.sum(axis=0) / count,
+            bias_rows=bias_rows.sum(axis=0) / count,
             bias_variance=float((average @ solved @ average.transpose(0, 2, 1)).sum()) / count**2,
         )
 
@@ -431,7 +378,7 @@ class Products:
 
 
 def spectrum_of(autocorrelation: Real, length: int) -> Real:
-    """Eigenvalues of the circulant of so many samples that holds a Toeplitz matrix."""
+    """Eigenvalues of the circulant matrix of some length that contains a Toeplitz matrix."""
     around = np.zeros(length)
     around[: autocorrelation.size] = autocorrelation
     around[length - autocorrelation.size + 1 :] += autocorrelation[:0:-1]
@@ -452,12 +399,7 @@ def _products(
     return np.asarray(weighed.view(np.float64) @ right.view(np.float64).T)
 
 
-def _moved(head: Real) -> Real:
-    """Matrix that turns an impulse response's first samples into those of its convolution."""
-    return np.asarray(scipy.linalg.toeplitz(head, np.zeros(head.size)).T)
-
-
 def _shifted(x: Real) -> Real:
-    """A signal and what came 1 … LONGEST samples before, 0 before it begins."""
+    """A signal delayed by 0 … LONGEST samples, 0 before it begins."""
     padded = np.concatenate([np.zeros(LONGEST), x])
     return np.stack([padded[LONGEST - k : padded.size - k] for k in range(LONGEST + 1)])

@@ -1,4 +1,4 @@
-"""How far statistics reach: the lags that they keep, and the rows that stand beside the input."""
+"""The reach of statistics: the lags that they keep, and the rows of the bias."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from hmpim.identify.noise.autoregression import LONGEST
 __all__ = ["AHEAD", "Reach"]
 
 AHEAD = 32
-"""Samples by which an impulse response may begin before its input: a spline's reach, with room."""
+"""Samples that an impulse response may begin before its input: a spline's reach, with a margin."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,8 +25,8 @@ class Reach:
         Samples of a run at which its bias has a value of its own, linear between them and constant
         outside; one knot is a constant bias.
     beyond : bool
-        Whether products of the input's cube and the output's standstills are kept too: they tell
-        what no linear system does.
+        Whether products of the input's cube and the output's standstills are kept too: they reveal
+        nonlinearity and held outputs.
 
     Examples
     --------
@@ -46,17 +46,17 @@ class Reach:
 
     @property
     def span(self) -> int:
-        """Greatest lag between two samples of the input that is kept."""
+        """Greatest lag kept between two samples of the input."""
         return self.lags + AHEAD + LONGEST
 
     @property
     def back(self) -> int:
-        """Greatest lag at which the output follows the input that is kept."""
+        """Greatest lag kept at which the output follows the input."""
         return self.lags + LONGEST
 
     @property
     def forth(self) -> int:
-        """Greatest lag at which it goes before the input that is kept."""
+        """Greatest lag kept at which the output precedes the input."""
         return AHEAD + LONGEST
 
     @property
@@ -65,10 +65,7 @@ class Reach:
         return len(self.knots)
 
     def fixed(self, first: int, count: int) -> Real:
-        """Rows of the bias at `count` samples of a run from `first` on, shape (rows, count).
-
-        0 before the run begins.
-        """
+        """Rows of the bias at some samples of a run, (rows, count); 0 before the run begins."""
         t = np.arange(first, first + count)
         if self.rows == 1:
             return np.asarray((t >= 0).astype(np.float64)[None, :])

@@ -1,7 +1,7 @@
 """One run, compressed: products of its samples at a window of lags, and its two ends.
 
-Everything is a sum over all samples, 0 taken for what lies outside the run; what of it a fit does
-not want, the samples at either end tell. So a run is read once, block by block.
+Everything is a sum over all samples, with 0 outside the run. Terms that a fit excludes are computed
+from the samples at either end. So a run is read once, block by block.
 """
 
 from dataclasses import dataclass, replace
@@ -32,21 +32,21 @@ SUMMED = -2
 """Place of the input's running sum among the outputs of a run."""
 
 STOOD = 64
-"""Longest standstill of an output that is told from longer ones, in samples."""
+"""Longest standstill of an output that is counted separately, in samples."""
 
 _PIECE = 16_384
 """Samples that are read at once, at least."""
 
 _FEW = 64
-"""New samples up to which their products are sooner made one by one than by transforms."""
+"""New samples up to which their products are faster one by one than by transforms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Run(ByValue):
     """Products of one run's input u and outputs v.
 
-    Outputs are the bias' rows, the running sum of the input, and the measured output. Input and
-    measured output are deviations from their first samples; the sum is not, since an integrator
+    Outputs are the rows of the bias, the running sum of the input, and the measured output. Input
+    and measured output are deviations from their first samples; the sum is not, since an integrator
     turns a constant input into a ramp.
 
     Parameters
@@ -68,17 +68,17 @@ class Run(ByValue):
     tail_y : ndarray, shape (forth,)
         Its last ones.
     scale : ndarray, shape (1,)
-        What the input is divided by before it is cubed: a power of two, which no block changes but
-        exactly. All that follows is empty where it is not kept.
+        Divisor of the input before it is cubed: a power of two, so that a change of it is exact.
+        This and all that follows is empty where no cubes are kept.
     ww : ndarray, shape (span + 1,)
         Σ w(t) w(t-k), w the cube.
     wu : ndarray, shape (2 span + 1,)
         Σ w(t) u(t-k), k from -span on.
     vw : ndarray, shape (rows + 1, forth + back + 1)
-        Σ v(t) w(t-k), without the running sum's.
+        Σ v(t) w(t-k), without the running sum.
     stood : ndarray, shape (STOOD + 1,)
-        Samples since the output last changed, then how often it had kept a value for 1, 2, …
-        samples, the last also for more.
+        Samples since the output last changed, then how often it kept a value for 1, 2, … samples;
+        the last entry also counts longer standstills.
     """
 
     samples: int
@@ -102,12 +102,12 @@ class Run(ByValue):
         return self.ww.size > 0
 
     def total(self, reach: Reach) -> float:
-        """Sum of the input, as a deviation: the bias' rows add to 1 at each sample."""
+        """Sum of the input, as a deviation: the rows of the bias add to 1 at each sample."""
         return float(self.vu[: reach.rows, reach.forth].sum())
 
 
 def begun(reach: Reach, u: float, y: float) -> Run:
-    """An empty run that will begin with these samples."""
+    """Return an empty run that will begin with these samples."""
     count, kept = reach.rows + 2, int(reach.beyond)
     return Run(
         samples=0,
@@ -143,43 +143,40 @@ def continued(run: Run, reach: Reach, u: Real, y: Real) -> Run:
     return run
 
 
-def cubes(run: Run, u: Real) -> Real:
+def _cubes(run: Run, u: Real) -> Real:
     """Cubes of inputs, by the scale of a run."""
     return np.asarray((u / run.scale[0]) ** 3 if run.scale[0] else np.zeros_like(u))
 
 
 def without_cubes(run: Run) -> Run:
-    """A run without what tells of more than linear systems."""
-    nothing = np.empty(0)
-    empty = run.vw[:, :0]
-    return replace(run, scale=nothing, ww=nothing, wu=nothing, vw=empty, stood=nothing)
+    """A run without cubes and standstills."""
+    none = np.empty(0)
+    return replace(run, scale=none, ww=none, wu=none, vw=run.vw[:, :0], stood=none)
 
 
 def of_cubes(run: Run, reach: Reach, scale: float) -> Run:
-    """The run that has the cube, by another scale, for an input; without its running sum."""
+    """The run that has the cube, by another scale, as its input; without its running sum."""
     ratio = (run.scale[0] / scale) ** 3
-    vu = np.insert(run.vw * ratio, reach.rows, 0.0, axis=0)
     vv = run.vv.copy()
     vv[SUMMED] = vv[:, SUMMED] = 0.0
     return replace(
         without_cubes(run),
         level=run.level * np.array([0.0, 1.0]),
         uu=run.ww * ratio**2,
-        vu=vu,
+        vu=np.insert(run.vw * ratio, reach.rows, 0.0, axis=0),
         vv=vv,
-        head_u=cubes(run, run.head_u) * ratio,
-        tail_u=cubes(run, run.tail_u) * ratio,
+        head_u=_cubes(run, run.head_u) * ratio,
+        tail_u=_cubes(run, run.tail_u) * ratio,
     )
 
 
 def cubes_by(run: Run, reach: Reach, scale: float, *, to_the_end: bool) -> Real:
-    """Products `wu` by another scale, of an input and a cube that `closed` continues if asked."""
+    """Products `wu` by another scale; to the end, with input and cube continued by `closed`."""
     known = np.asarray(run.wu * (run.scale[0] / scale) ** 3)
     if not to_the_end:
         return known
-    third = of_cubes(run, reach, scale)
-    pair = (run, third)
-    after = [closed(one, reach).tail_u[-AHEAD:] for one in pair]
+    pair = (run, of_cubes(run, reach, scale))
+    after = [closed(each, reach).tail_u[-AHEAD:] for each in pair]
     whole = [np.concatenate([x.tail_u, y]) for x, y in zip(pair, after, strict=True)]
     behind = np.correlate(whole[0], after[1], "valid")[::-1]
     before = np.correlate(whole[1], after[0], "valid")[:-1]
@@ -187,23 +184,19 @@ def cubes_by(run: Run, reach: Reach, scale: float, *, to_the_end: bool) -> Real:
 
 
 def _scaled(run: Run, u: Real) -> Run:
-    """A run by a scale that no input exceeds."""
+    """A run with a scale that no input exceeds."""
     peak = float(np.abs(u).max())
     if peak <= run.scale[0]:
         return run
     scale = 2.0 ** np.ceil(np.log2(peak))
     ratio = (run.scale[0] / scale) ** 3
     return replace(
-        run,
-        scale=np.array([scale]),
-        ww=run.ww * ratio**2,
-        wu=run.wu * ratio,
-        vw=run.vw * ratio,
+        run, scale=np.array([scale]), ww=run.ww * ratio**2, wu=run.wu * ratio, vw=run.vw * ratio
     )
 
 
 def _stood(run: Run, y: Real) -> Real:
-    """How long the output kept its values, more of which follow."""
+    """Counts of the output's standstills, with more outputs counted."""
     begins = run.samples == 0
     changes = np.flatnonzero(np.diff(y, prepend=y[0] if begins else run.tail_y[-1]))
     if not changes.size:
@@ -235,7 +228,7 @@ def closed(run: Run, reach: Reach) -> Run:
 
 
 def shortened(run: Run, reach: Reach) -> Run:
-    """The same run, of which no more is kept than a shorter reach asks for."""
+    """The same run, reduced to a shorter reach, without cubes."""
     return replace(
         without_cubes(run),
         uu=run.uu[: reach.span + 1],
@@ -247,11 +240,14 @@ def shortened(run: Run, reach: Reach) -> Run:
 
 
 def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
+    """A run and more samples of its input and outputs."""
     whole_u = np.concatenate([run.tail_u, u])
-    whole_v = np.hstack([_before(run, reach), v])
+    fixed = reach.fixed(run.samples - reach.forth, reach.forth)
+    before = np.vstack([fixed, last_sums(run, reach, reach.forth), run.tail_y])
+    whole_v = np.hstack([before, v])
     inputs, whole = u[None], whole_u[None]
     if run.cubed:
-        whole = np.vstack([whole, cubes(run, whole_u)])
+        whole = np.vstack([whole, _cubes(run, whole_u)])
         inputs = whole[:, reach.span :]
     products = _one_by_one if u.size <= _FEW else _transformed
     xx, after, ahead, vv = products(reach, (inputs, v), (whole, whole_v))
@@ -280,18 +276,12 @@ def _added(run: Run, reach: Reach, u: Real, v: Real) -> Run:
 def _transformed(
     reach: Reach, new: tuple[Real, Real], whole: tuple[Real, Real]
 ) -> tuple[Real, Real, Real, Real]:
-    """Products of new inputs and outputs and those `span` and `forth` samples before, by FFT.
+    """Products of new inputs and outputs with the `span` and `forth` samples before, by FFT.
 
-    Inputs are the input and, where it is kept, its cube.
-
-    Returns
-    -------
-    xx : ndarray, shape (inputs, inputs, span + 1)
-        Σ x_i(t) x_j(t-k).
-    after, ahead : ndarray, shape (inputs, rows + 2, back + 1) and (inputs, rows + 2, forth)
-        Σ v(t) x(t-k), k from 0 on; Σ x(t) v(t-k), k from 1 on.
-    vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
-        Σ v_i(t) v_j(t-k).
+    Inputs are the input and, where it is kept, its cube. Returned are xx, Σ x_i(t) x_j(t-k), shape
+    (inputs, inputs, span + 1); after, Σ v(t) x(t-k), k from 0 on, (inputs, rows + 2, back + 1);
+    ahead, Σ x(t) v(t-k), k from 1 on, (inputs, rows + 2, forth); and vv, Σ v_i(t) v_j(t-k),
+    (rows + 2, rows + 2, LONGEST + 1).
     """
     length = scipy.fft.next_fast_len(new[0].shape[1] + reach.span, real=True)
     new_x, new_v = (_late(x, reach.span, length) for x in new)
@@ -307,35 +297,28 @@ def _transformed(
 def _one_by_one(
     reach: Reach, new: tuple[Real, Real], whole: tuple[Real, Real]
 ) -> tuple[Real, Real, Real, Real]:
-    """The same of a few new samples, without transforms."""
+    """The same for a few new samples, without transforms."""
     (x, v), (whole_x, whole_v) = new, whole
-    near = whole_v[:, reach.forth - LONGEST :]
-    xx = _correlated(x, whole_x)
     after = _correlated(v, whole_x).transpose(1, 0, 2)[..., : reach.back + 1]
     ahead = _correlated(x, whole_v)[..., 1:]
-    return xx, after, ahead, _correlated(v, near)
+    vv = _correlated(v, whole_v[:, reach.forth - LONGEST :])
+    return _correlated(x, whole_x), after, ahead, vv
 
 
 def _correlated(new: Real, whole: Real) -> Real:
-    """Σ a(t) b(t-k) of each a that is new and each b, k from 0 on."""
+    """Σ a(t) b(t-k) for each new a and each b, k from 0 on."""
     return np.array([[np.correlate(b, a, "valid")[::-1] for b in whole] for a in new])
 
 
-def _before(run: Run, reach: Reach) -> Real:
-    """The outputs just before what follows, shape (rows + 2, forth)."""
-    fixed = reach.fixed(run.samples - reach.forth, reach.forth)
-    return np.vstack([fixed, last_sums(run, reach, reach.forth), run.tail_y])
-
-
 def _late(x: Real, by: int, length: int) -> Complex:
-    """Transform of what begins `by` samples late."""
+    """Transform of signals that begin `by` samples late."""
     shifted = np.zeros((*x.shape[:-1], length))
     shifted[..., by : by + x.shape[-1]] = x
     return np.asarray(scipy.fft.rfft(shifted, length))
 
 
 def _filled(head: Real, count: int, more: Real) -> Real:
-    """First samples, the following put in place."""
+    """First samples of a run, with the following ones inserted."""
     if not more.size:
         return head
     out = head.copy()

@@ -1,8 +1,9 @@
-"""Where to begin: a rough response from statistics alone.
+"""Starting point: a rough response from statistics alone.
 
 The impulse response with the least squared error, of any shape, solves the Toeplitz system of the
-auto- and the cross-correlation; least residuals with FFTs find it, a small ridge keeps it quiet
-where nothing is excited. From its transform the starts of the joint fit are found.
+auto- and the cross-correlation. The method of minimal residuals with FFTs solves it, and a small
+ridge keeps the response small where nothing is excited. Its transform gives the starts of the joint
+fit.
 """
 
 import numpy as np
@@ -16,13 +17,13 @@ from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import DEEPEST
 
-__all__ = ["correlations", "excited", "power_of", "rough_of"]
+__all__ = ["correlations", "excited", "rough_of"]
 
 _RIDGE = 1e-5
-"""Of the greatest power of the input; where there is less, the response is pulled to 0."""
+"""Share of the input's greatest power; where there is less, the response is pulled to 0."""
 
 _STEPS, _PRECISION = 200, 1e-7
-"""Of the system's solution, which is a start alone."""
+"""Of the solution of the system, which is only a start."""
 
 
 def correlations(statistics: Statistics) -> tuple[Real, Real]:
@@ -54,7 +55,7 @@ def _without(total: float, samples: Real) -> Real:
     return np.asarray(total - np.concatenate([[0.0], np.cumsum(samples)]))
 
 
-def power_of(statistics: Statistics, length: int) -> Real:
+def _power_of(statistics: Statistics, length: int) -> Real:
     """Power spectrum of the input at length // 2 + 1 frequencies, smoothed by its lag window."""
     uu, _ = correlations(statistics)
     windowed = uu * scipy.signal.windows.blackman(2 * uu.size - 1)[uu.size - 1 :]
@@ -66,7 +67,7 @@ def excited(statistics: Statistics) -> tuple[float, float]:
     if statistics.band is not None:
         return statistics.band
     length = scipy.fft.next_fast_len(4 * statistics.reach.span, real=True)
-    level = np.sqrt(power_of(statistics, length))
+    level = np.sqrt(_power_of(statistics, length))
     level[0] = 0.0
     return band_of_levels(level, statistics.fs / length)
 
@@ -80,17 +81,9 @@ def rough_of(
 ) -> RoughResponse:
     """Estimate the response without a model, from the correlations of input and output.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        What was read.
-    known : ndarray, shape (taps,), optional
-        Impulse response that is already explained, and is subtracted.
-    lag : int, optional
-        Delay in samples to begin from; by default the lag of their greatest correlation.
-    differenced : bool
-        Whether it is the output's differences that answer the input: the output itself then
-        answers the input's running sum.
+    An impulse response that is `known`, (taps,), is subtracted. The delay to begin from is that of
+    the greatest correlation unless `lag` gives it, in samples. If `differenced`, the output is the
+    response to the running sum of the input.
     """
     reach = statistics.reach
     uu, yu = correlations(statistics)
@@ -102,7 +95,7 @@ def rough_of(
     if known is not None:
         made = scipy.fft.irfft(scipy.fft.rfft(known, length) * spectrum, length)
         cross = cross - made[: cross.size]
-    power = power_of(statistics, length)
+    power = _power_of(statistics, length)
     ridge = _RIDGE * float(power.max())
     answer = _solved(spectrum, ridge, cross, length)
     moved = scipy.fft.rfft(answer, length) * np.exp(
@@ -125,8 +118,8 @@ def rough_of(
 
 
 def _solved(spectrum: Real, ridge: float, right: Real, length: int) -> Real:
-    """Solution of a Toeplitz system, made not quite definite by the ends of a run, and a ridge."""
-    power, most = float(spectrum.max()), float(np.abs(right).max()) or 1.0  # of any unit
+    """Solution of a Toeplitz system with a ridge; the ends of a run make it not quite definite."""
+    power, most = float(spectrum.max()), float(np.abs(right).max()) or 1.0  # any unit will do
     spectrum, ridge = spectrum / power, ridge / power
 
     def times(x: Real) -> Real:

@@ -1,4 +1,4 @@
-"""What is kept of a record: enough to identify it, whatever its length."""
+"""Compressed records: enough to identify them, whatever their length."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,14 +22,14 @@ __all__ = ["Statistics", "compress"]
 _SHARE = 5
 _LONGEST = 16_384
 _SHORTEST = 32
-"""A fifth of the record is the window by default, between these."""
+"""The default window is a fifth of the record, between these limits."""
 
 _MOST = 10_000_000
 _FARTHEST = 1e15
 """Largest window, and sample of the last knot."""
 
 _ROUNDING = 1e-9
-"""Share by which rates that were read off time stamps may differ: by rounding."""
+"""Relative difference of rates that come from time stamps, by rounding."""
 
 Sharing = Literal["own", "common"]
 
@@ -38,7 +38,7 @@ Sharing = Literal["own", "common"]
 class Statistics(ByValue):
     """A record, or several, compressed: products at a window of lags, and the ends of each run.
 
-    Made by `compress`. `update` continues the last run in place, as a hash does; ``a + b`` joins
+    Made by `compress`. `update` continues the run in place, as a hash does; ``a + b`` joins
     separate runs. Its size does not depend on the length of a run.
 
     Parameters
@@ -46,7 +46,7 @@ class Statistics(ByValue):
     fs : float
         Rate in Hz.
     reach : Reach
-        What is kept.
+        Lags and knots.
     runs : tuple of Run
         Each with its own beginning.
     names, units : (str, str)
@@ -89,7 +89,7 @@ class Statistics(ByValue):
 
     @property
     def samples(self) -> int:
-        """How many were read, of all runs."""
+        """How many samples were read, in all runs."""
         return sum(run.samples for run in self.runs)
 
     @property
@@ -99,7 +99,7 @@ class Statistics(ByValue):
 
     @property
     def nbytes(self) -> int:
-        """Size of all that is kept."""
+        """Size of all arrays."""
         return sum(
             getattr(run, name).nbytes
             for run in self.runs
@@ -123,7 +123,7 @@ class Statistics(ByValue):
         Raises
         ------
         ArgumentError
-            If they are not as many, or not finite, or several runs were joined.
+            If their numbers differ, a sample is not finite, or several runs were joined.
         """
         more_u, more_y = np.atleast_1d(numbers_of("u", u)), np.atleast_1d(numbers_of("y", y))
         if more_u.size != more_y.size:
@@ -147,7 +147,7 @@ class Statistics(ByValue):
         *others : Statistics
             Of the same input, output, rate and window.
         bias : {'own', 'common'}, optional
-            Whether each run has its own bias or all have one; as before by default.
+            Whether each run has its own bias or all share one; unchanged by default.
 
         Raises
         ------
@@ -165,8 +165,8 @@ class Statistics(ByValue):
                 "compress without knots"
             )
         every = (self, *others)
-        runs = tuple(run for one in every for run in one.runs)
-        reach = replace(self.reach, beyond=all(one.reach.beyond for one in every))
+        runs = tuple(run for each in every for run in each.runs)
+        reach = replace(self.reach, beyond=all(each.reach.beyond for each in every))
         if not reach.beyond:
             runs = tuple(without_cubes(run) for run in runs)
         return replace(self, reach=reach, runs=runs, bias=chosen)
@@ -207,15 +207,15 @@ def compress(
     knots: Sequence[float] = (),
     bias: Sharing = "own",
 ) -> Statistics:
-    """Compress a record to what identification needs of it, in one pass.
+    """Compress a record to what identification needs, in one pass.
 
-    Kept are products of the samples at a window of lags, and the samples at either end: as much
-    for a second as for a week. `hmpim.identify` takes the result as it takes a record.
+    The result contains products of the samples at a window of lags, and the samples at either end:
+    its size is the same for a second as for a week. `hmpim.identify` takes it in place of a record.
 
     Parameters
     ----------
     record : Record
-        One test. Of several inputs or outputs, name one each.
+        One test.
     lags : int, optional
         Window in samples: delay and settling time of the system must fit into it. A fifth of the
         record by default, at most 16 384.
@@ -225,7 +225,7 @@ def compress(
         Times in s from the beginning of a run at which a drifting bias has a value of its own; it
         is linear between them. A constant bias by default.
     bias : {'own', 'common'}
-        Whether runs that are joined have a bias each, or one in common.
+        Whether joined runs have a bias each, or one in common.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def compress(
     Raises
     ------
     ArgumentError
-        If a channel is not in the record, or the window is none.
+        If a channel is not in the record, or the window is not valid.
     RecordError
         If the record has gaps.
 
@@ -243,8 +243,8 @@ def compress(
     -----
     With the impulse response h(θ) of any model, the sum of squared errors is
     y·y - 2hᵀr + hᵀRh, r the cross-correlation and R the Toeplitz matrix of the input's
-    autocorrelation, less what the full convolution has outside the samples that count: exact, and
-    no matrix of lags by lags is made.
+    autocorrelation, less the part of the full convolution outside the samples that count. This is
+    exact, and no matrix of lags by lags is made.
 
     Examples
     --------
@@ -265,7 +265,12 @@ def compress(
                 "compress the stretches between the gaps one by one (--from, --to) and join them "
                 "with + (hmpim compress a.h5 b.h5)"
             )
-    window = _window(lags, aligned.samples)
+    if lags is None:
+        lags = int(np.clip(aligned.samples // _SHARE, _SHORTEST, _LONGEST))
+    elif not 1 <= lags <= _MOST:
+        raise ArgumentError(
+            f"lags = {lags} is no window; give a number of samples from 1 to {_MOST}"
+        )
     if not all(abs(knot) * aligned.fs < _FARTHEST for knot in knots):
         raise ArgumentError(f"knots = {shown(knots)} are no times in s; give finite numbers")
     places = tuple(round(knot * aligned.fs) for knot in knots)
@@ -277,7 +282,7 @@ def compress(
         )
     statistics = Statistics(
         fs=aligned.fs,
-        reach=Reach(lags=window, knots=places or (0,)),
+        reach=Reach(lags=lags, knots=places or (0,)),
         runs=(),
         names=(source.name, answer.name),
         units=(source.unit, answer.unit),
@@ -288,18 +293,8 @@ def compress(
     return statistics.update(source.values, answer.values)
 
 
-def _window(lags: int | None, samples: int) -> int:
-    if lags is None:
-        return int(np.clip(samples // _SHARE, _SHORTEST, _LONGEST))
-    if not 1 <= lags <= _MOST:
-        raise ArgumentError(
-            f"lags = {lags} is no window; give a number of samples from 1 to {_MOST}"
-        )
-    return lags
-
-
 def _named(signals: tuple[Signal, ...], name: str | None, role: str) -> Signal:
-    """The channel that is asked for, or the only one."""
+    """The named channel, or the only one."""
     known = ", ".join(repr(signal.name) for signal in signals)
     if name is None and len(signals) > 1:
         raise ArgumentError(

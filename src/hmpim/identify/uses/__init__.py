@@ -1,7 +1,7 @@
-"""What a result is used for.
+"""Uses of a result.
 
-predict     a model of it, and what that makes of another input
-validate    the model held against a record that it has not seen
-compare     two results of one unit: what has changed, beyond error bars
+predict     a model from it, and its output for another record
+validate    the model tested on another record
+compare     two results of one unit: changes beyond the error bars
 gain_phase  gain and phase at any frequency
 """

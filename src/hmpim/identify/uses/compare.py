@@ -1,12 +1,13 @@
-"""Two results of one unit, held against each other within their bars: after a repair, say."""
+"""Comparison of two results of one unit within their error bars: after a repair, for example."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.chance import deviations
 from hmpim.identify.result import Estimate, Identification, Parameters
+from hmpim.identify.result.groups import EVERY
 
 __all__ = ["Change", "compare"]
 
@@ -18,7 +19,7 @@ class Change:
     Parameters
     ----------
     output, input, name : str
-        Which it is.
+        Channels and name of the parameter.
     old, new : Estimate
         In the older and in the newer result.
     deviations : float
@@ -43,7 +44,7 @@ class Change:
 
 @checked
 def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
-    """Hold every parameter that both results tell against its older self.
+    """Compare every parameter that both results have.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     Returns
     -------
     tuple of Change
-        One for each parameter. The limit leaves a chance of 0.01 % that anything is called changed
-        in a unit that has not, however many parameters there are.
+        One for each parameter. The limit is such that an unchanged unit shows any change with a
+        chance of 0.01 %, however many parameters there are.
 
     Raises
     ------
@@ -73,17 +74,15 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     >>> [c.name for c in compare(found(0.101, 3), found(0.1, 4)) if c.changed][:1]
     ['delay']
     """
-    both: list[tuple[str, str, str, Estimate, Estimate]] = []
-    older = {(pair.output, pair.input): pair for pair in old.pairs}
-    for pair in new.pairs:
-        before = older.get((pair.output, pair.input))
-        if before is None:
-            continue
-        for field in fields(Parameters):
-            was: Estimate | None = getattr(before.parameters, field.name)
-            now: Estimate | None = getattr(pair.parameters, field.name)
-            if was is not None and now is not None:
-                both.append((pair.output, pair.input, field.name, was, now))
+    older = {(pair.output, pair.input): pair.parameters for pair in old.pairs}
+    none = Parameters()
+    both: list[tuple[str, str, str, Estimate, Estimate]] = [
+        (pair.output, pair.input, name, was, now)
+        for pair in new.pairs
+        for name in EVERY
+        if (was := getattr(older.get((pair.output, pair.input), none), name)) is not None
+        and (now := getattr(pair.parameters, name)) is not None
+    ]
     if not both:
         raise RecordError(
             "the two results have no parameter in common; are they of the same unit, with the "

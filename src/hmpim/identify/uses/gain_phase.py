@@ -32,7 +32,7 @@ class GainPhase:
         From the measured response, in dB (of output unit over input unit) and degrees,
         continuous from DC (from -90° of an integrator); None outside the measured band.
     model_gain_db, model_phase : Estimate
-        From the fitted model, which reaches beyond that band at the model's own risk.
+        From the fitted model; beyond that band they are an extrapolation.
     """
 
     frequency: float
@@ -45,7 +45,7 @@ class GainPhase:
 def gain_and_phase(
     pair: PairIdentification, frequency: ArrayLike, *, fs: float
 ) -> tuple[GainPhase, ...]:
-    """Gain and phase at chosen frequencies, each with its interval, by two routes.
+    """Gain and phase at chosen frequencies, each with its interval, by two methods.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def gain_and_phase(
 
     Notes
     -----
-    The measurement is divided by the model first, whose phase says how often it has turned
-    (`hmpim.identify.reading.bandwidth`). The model's error is carried over to first order from the
+    The measurement is divided by the model first, whose phase gives the number of turns
+    (`hmpim.identify.reading.bandwidth`). The model's error is propagated to first order from the
     covariance of its coefficients.
 
     Examples
@@ -108,13 +108,13 @@ def gain_and_phase(
 
 
 def _shortened(rising: Real) -> Real:
-    """Coefficients of powers of 1 - 1/z without those that only z needs."""
-    seen = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())
-    return rising[: seen[-1] + 1]
+    """Coefficients of powers of 1 - 1/z without the last zeros, which only powers of z need."""
+    last = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())[-1]
+    return rising[: last + 1]
 
 
 def measurable(frequency: ArrayLike, fs: float) -> Real:
-    """Return frequencies in Hz, shape (m,), if a record of rate `fs` can tell of them.
+    """Return frequencies in Hz, shape (m,), if a record of rate `fs` can contain them.
 
     Raises
     ------
@@ -145,12 +145,12 @@ def _at(
     there = np.array([f])
     value = complex(response(system, there)[0])
     by_delay, above, below = log_slopes(system, there)
-    slope = np.concatenate([by_delay, above[::-1], below[::-1]])[:, 0]  # as the covariance is
+    slope = np.concatenate([by_delay, above[::-1], below[::-1]])[:, 0]  # ordered as the covariance
     poles = np.trim_zeros(system.denominator, "f")  # an integrator turns by -90° everywhere
     integrators = system.denominator.size - poles.size
     turned = float(phase(replace(system, denominator=poles), there)[0]) - integrators * np.pi / 2
     if value.real * np.cos(turned) + value.imag * np.sin(turned) < 0:
-        turned += np.pi  # the phase counts from DC; a negative scale factor is half a turn
+        turned += np.pi  # the phase counts from DC; a negative scale factor adds half a turn
     log_gain = float(np.log(abs(value)))
     spread = [float(part @ covariance @ part) for part in (slope.real, slope.imag)]
     measured = ratio_at(pair.frequency_response, system, f, fs, pair.intersample)

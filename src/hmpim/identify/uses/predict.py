@@ -1,4 +1,4 @@
-"""From an identification to a model, and the model against data it has not seen."""
+"""A model from an identification, and its prediction of another record."""
 
 import math
 from dataclasses import dataclass, fields
@@ -30,14 +30,14 @@ _NEEDED = ("delay", "scale_factor", "bias", "noise_std")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prediction:
-    """A model's output beside the measured one.
+    """The output of a model, together with the measured output.
 
     Parameters
     ----------
     time, measured, predicted : ndarray, shape (n,)
         Seconds; the output's unit.
     scored : ndarray of bool, shape (n,)
-        Samples on which `fit_percent` is counted.
+        Samples that `fit_percent` is computed from.
     fit_percent : float
         100 (1 - ‖measured - predicted‖ / ‖measured - mean‖) over the scored samples.
     """
@@ -51,23 +51,19 @@ class Prediction:
 
 def has_model(pair: PairIdentification) -> bool:
     """Whether a pair has every figure that a model needs, doubtful or not."""
-    return not _untold(pair)
-
-
-def _untold(pair: PairIdentification) -> list[str]:
-    return [name for name in _NEEDED if getattr(pair.parameters, name) is None]
+    return None not in [getattr(pair.parameters, name) for name in _NEEDED]
 
 
 @checked
 def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
-    """Model that simulates what was identified, the whole sensor chain and its errors included.
+    """Return a model that simulates the whole identified sensor chain, its errors included.
 
     Parameters
     ----------
     pair : PairIdentification
         From `hmpim.identify`, or read back.
     fs : float, optional
-        Rate of the record in Hz, ``result.record.fs``, for the model to remember.
+        Rate of the record in Hz, ``result.record.fs``, which the model stores.
 
     Raises
     ------
@@ -103,30 +99,30 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
 
 
 def _why(pair: PairIdentification) -> str:
-    """Name what a pair without a model lacks, and the doubt that says why."""
-    untold = _untold(pair)
-    *names, last = (in_words(name) for name in untold)
+    """Name the figures that a pair without a model lacks, and the doubt that explains it."""
+    missing = [name for name in _NEEDED if getattr(pair.parameters, name) is None]
+    *names, last = (in_words(name) for name in missing)
     words = f"{', '.join(names)} and {last}" if names else last
-    doubts = (w for w in pair.warnings if w.severity == "doubt" and untold[0] in w.parameters)
+    doubts = (w for w in pair.warnings if w.severity == "doubt" and missing[0] in w.parameters)
     cause = next(doubts, None)
     return words if cause is None else f"{words}. {cause.message}"
 
 
 def fit_percent_of(y: Real, residual: Real) -> float:
-    """100 (1 - ‖residual‖ / ‖y - mean y‖) of samples that count, shape (n,); 0 of a constant."""
+    """100 (1 - ‖residual‖ / ‖y - mean y‖) over the samples that count, (n,); 0 for a constant."""
     spread = float(np.linalg.norm(y - y.mean()))
     return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
 
 
 def rate_of(pair: PairIdentification) -> float | None:
-    """Rate in Hz at which software was identified, where the result still has its samples."""
+    """Rate in Hz at which software was identified, if the result contains its samples."""
     if pair.intersample != "sampled" or pair.time is None or pair.time.size < 2:
         return None
     return float((pair.time.size - 1) / (pair.time[-1] - pair.time[0]))
 
 
 def settling_time(model: Model) -> float:
-    """Time in s after which a model has forgotten: its delay and five slowest time constants."""
+    """Settling time of a model in s: its delay and five slowest time constants."""
     if model.intersample != "sampled" or model.fs is None:
         slowest = slowest_time_constant(np.asarray(model.denominator[::-1]))
     else:
@@ -140,7 +136,7 @@ def _value(estimate: Estimate | None) -> float | None:
 
 
 def _spread(pair: PairIdentification) -> Spread | None:
-    """Errors of a model's figures; None where the record does not tell them."""
+    """Errors of a model's figures; None where the record does not determine them."""
     if pair.covariance is None or pair.intersample == "sampled":
         return None
     known = {f.name: getattr(pair.parameters, f.name, None) for f in fields(Spread)}
@@ -157,17 +153,17 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     Parameters
     ----------
     pair : PairIdentification
-        What was identified, perhaps on another record.
+        Identified on this or another record.
     record : Record
-        Holds channels of the pair's names.
+        With channels of the pair's names.
     start : float, optional
-        Time in s from which to score; by default from when the model has forgotten what
-        came before the record: the delay and five of its slowest time constants.
+        Time in s from which to score; by default after the settling time, the delay and five of the
+        slowest time constants, since the input before the record is unknown.
 
     Raises
     ------
     RecordError
-        If a channel is missing, or nothing is left to score.
+        If a channel is missing, or no samples remain to score.
     """
     aligned = uniform(record)
     model = to_model(pair, fs=aligned.fs)

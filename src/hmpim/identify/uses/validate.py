@@ -1,4 +1,4 @@
-"""A result held against a record it has not seen: fit, residual, and the band it promised."""
+"""Validation of a result on another record: fit, residual, and the band of the prediction."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -30,10 +30,10 @@ _DRAWS = 32
 """Models drawn for the prediction band; its width is then known to an eighth."""
 
 _SHARES = {"fit_percent": 1.0, "coverage": 100.0}
-"""Checks that people read in per cent, and how many of these their value 1 is."""
+"""Checks that are written in per cent, and how many of these a value of 1 is."""
 
 _PLACES = {"fit_percent": 2, "coverage": 1}
-"""Decimal places with which they are written."""
+"""Their decimal places."""
 
 _FEWEST = 50
 """Samples from which a residual can be judged."""
@@ -41,16 +41,16 @@ _FEWEST = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What a validation must meet; None where a check is only reported.
+    """Requirements of a validation; None where a check is only reported.
 
     Parameters
     ----------
     fit_percent : float or None
         Least fit, 100 (1 - ‖measured - predicted‖ / ‖measured - mean‖).
     noise_ratio : float or None
-        Greatest residual over the noise that was identified, both as standard deviations. The
-        prediction band must then hold between the shares that noise so much greater or smaller
-        would leave in it.
+        Greatest ratio of the residual to the identified noise, both as standard deviations. The
+        share of samples in the prediction band must then lie between the shares for noise that is
+        greater and smaller by this ratio.
     chance : float or None
         Least p-value of the residual's tests: that it does not follow the input, and that it is
         white where the noise was.
@@ -89,7 +89,7 @@ class Check:
     low, high : float or None
         Its bounds; None where it has none.
     message : str
-        What it says, in a sentence.
+        The result in a sentence.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Check:
 
     @property
     def text(self) -> str:
-        """The figure for people: shares in per cent, a p-value no smaller than one that counts.
+        """The figure for people: shares in per cent; of a very small p-value only the bound.
 
         Examples
         --------
@@ -141,13 +141,13 @@ class OutputValidation:
     output : str
         Its name.
     inputs : tuple of str
-        Inputs that the prediction is made of.
+        Inputs of the prediction.
     time, measured, predicted, std : ndarray, shape (n,)
-        Seconds; the output's unit. `std` counts noise and what is open about the model.
+        Seconds; the output's unit. `std` includes the noise and the uncertainty of the model.
     scored : bool ndarray, shape (n,)
         Samples that count.
     checks : tuple of Check
-        What was checked.
+        The checks.
     """
 
     output: str
@@ -167,7 +167,7 @@ class OutputValidation:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Validation:
-    """A result held against a record.
+    """The validation of a result on a record.
 
     Parameters
     ----------
@@ -201,17 +201,17 @@ class Validation:
 
 @checked
 def validate(result: Identification, record: Record, *, bounds: Bounds | None = None) -> Validation:
-    """Hold a result against a record: what it predicts, against what was measured.
+    """Validate a result: compare its prediction with a record.
 
     Parameters
     ----------
     result : Identification
-        What was identified, on another record.
+        Identified on another record.
     record : Record
-        Holds channels of the same names.
+        With channels of the same names.
     bounds : Bounds, optional
-        What must be met; the residual at most 1.2 times the noise by default, and no test of it
-        below a p-value of 0.0001.
+        Requirements; by default the residual is at most 1.2 times the noise, and no test of it has
+        a p-value below 0.0001.
 
     Returns
     -------
@@ -221,16 +221,16 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     Raises
     ------
     RecordError
-        If no pair has a model, a channel is missing, or nothing is left to score.
+        If no pair has a model, a channel is missing, or too few samples remain to score.
 
     Notes
     -----
-    The whole chain is predicted. What came before the record is unknown: scoring begins when the
-    model has forgotten it. Clipped samples do not count, of a held output only those in which it
-    is read. An integrator's prediction may start anywhere. That a residual follows the input
-    counts against the result only beyond what the error bars admit at the same chance. Rounding
-    is not noise: it may have any colour and follow the input. A residual of at most 1e-9 of the
-    output (r.m.s.), as exact software leaves, has no bounds but that of the fit.
+    The whole chain is predicted. The input before the record is unknown, so that scoring begins
+    after the settling time of the model. Clipped samples do not count, and only the updates of a
+    held output do. The prediction of an integrator may have any offset. A residual that follows the
+    input counts against the result only beyond the error bars, at the same chance. Rounding is not
+    noise: it may have any colour and follow the input. A residual of at most 1e-9 of the output
+    (r.m.s.), as with exact software, has no bounds but that of the fit.
 
     Examples
     --------
@@ -243,26 +243,18 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     >>> validate(result, hmpim.run(sensor, stimulus, rng=2)).passed
     True
     """
-    limits = bounds or Bounds()
-    aligned = uniform(record)
-    known = [pair for pair in result.pairs if has_model(pair)]
-    if not known:
+    aligned, by_output = uniform(record), dict[str, list[PairIdentification]]()
+    for pair in filter(has_model, result.pairs):
+        by_output.setdefault(pair.output, []).append(pair)
+    if not by_output:
         raise RecordError(
             "the result has no model to validate: no pair has all figures that a model needs"
         )
-    for pair in known:
+    for pair in filter(has_model, result.pairs):
         _check_units(pair, aligned)
-    outputs = dict.fromkeys(pair.output for pair in known)
+    limits, fs = bounds or Bounds(), result.record.fs
     return Validation(
-        outputs=tuple(
-            _validated(
-                aligned,
-                [pair for pair in known if pair.output == name],
-                limits,
-                fs=result.record.fs,
-            )
-            for name in outputs
-        )
+        outputs=tuple(_validated(aligned, pairs, limits, fs=fs) for pairs in by_output.values())
     )
 
 
@@ -274,11 +266,11 @@ def _check_units(pair: PairIdentification, aligned: Aligned) -> None:
         return
     if not (known.bias.unit and u.unit and y.unit):
         return
-    named = (one for one in STRUCTURES.values() if one.name == pair.structure)
+    named = (known for known in STRUCTURES.values() if known.name == pair.structure)
     structure = next(named, FILTERS["static"])  # a filter's gain is output over input as well
     scales = {
         units_of(structure, (unit, y.unit))["scale_factor"]
-        for unit in (u.unit, "")  # the result may not know that of its input
+        for unit in (u.unit, "")  # the result may not have the unit of its input
     }
     if known.bias.unit != y.unit or known.scale_factor.unit not in scales:
         raise RecordError(
@@ -295,24 +287,21 @@ def _validated(
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
     models = [to_model(pair, fs=fs) for pair in pairs]
-    held = None  # the clock of a held output, whose phase is the record's own
-    if models[0].hold_period is not None:
-        held = detect_hold(y.values, aligned.fs)
     wait = max(settling_time(model) for model in models)
     scored = y.valid & (aligned.time >= aligned.start + wait)
     for pair in pairs:
         scored &= aligned.signal(pair.input).valid
-    if held is not None:
-        arrivals = updates(held, y.values.size, aligned.fs)
-        read = np.zeros(y.values.size, dtype=bool)
-        read[arrivals.index] = True
-        scored &= read
-        models = [replace(m, hold_period=held.period, hold_phase=held.phase) for m in models]
+    if models[0].hold_period is not None:
+        held = detect_hold(y.values, aligned.fs)  # the phase of its clock is the record's own
+        if held is not None:
+            index = updates(held, y.values.size, aligned.fs).index
+            scored &= np.isin(np.arange(y.values.size), index)
+            models = [replace(m, hold_period=held.period, hold_phase=held.phase) for m in models]
     predicted = _predicted(models, pairs, aligned)
     noise = models[0].noise_std
     model_std = _model_std(models, pairs, aligned)
     for level, side in ((models[0].saturation_low, -1.0), (models[0].saturation_high, 1.0)):
-        if level is not None:  # near a level, noise decides what is clipped
+        if level is not None:  # near a level, noise determines which samples are clipped
             scored &= side * (level - predicted) > DEVIATIONS * noise
             scored &= side * (level - y.values) > 0
     if np.count_nonzero(scored) < _FEWEST:
@@ -352,7 +341,7 @@ def _validated(
 def _predicted(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
 ) -> Real:
-    """Sum over the inputs, bias once; of a held output by its own clock."""
+    """Sum over the inputs, bias once; a held output is updated by its own clock."""
     total = np.full(aligned.samples, models[0].bias)
     clock = aligned.time - aligned.start
     for model, pair in zip(models, pairs, strict=True):
@@ -369,7 +358,7 @@ def _predicted(
 def _model_std(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
 ) -> Real:
-    """Standard deviation of the prediction by what is open about the models."""
+    """Standard deviation of the prediction, by the uncertainty of the models."""
     if any(model.spread is None for model in models):
         return np.zeros(aligned.samples)
     free = [replace(model, hold_period=None) for model in models]
@@ -381,13 +370,13 @@ def _model_std(
 def _size(
     residual: Real, noise: float, model_std: Real, std: Real, bounds: Bounds, *, unit: str
 ) -> tuple[Check, Check]:
-    """Size of the residual, and how often it is inside the band."""
+    """Size of the residual, and the share of samples inside the band."""
     expected = float(np.sqrt(np.mean(std**2))) or np.finfo(float).tiny
     ratio = float(np.sqrt(np.mean(residual**2))) / expected
     share = float(np.mean(np.abs(residual) <= HALF * std))
     low = high = None
     if bounds.noise_ratio is not None:
-        # Few samples scatter: the standard deviation of a share, and of a level.
+        # With few samples a share varies by its standard deviation.
         count = max(residual.size * effective_share(residual), 4.0)
         low = 2.0 * float(scipy.special.ndtr(HALF / bounds.noise_ratio)) - 1.0
         high = 2.0 * float(scipy.special.ndtr(HALF * bounds.noise_ratio)) - 1.0
@@ -424,23 +413,17 @@ def _tests(
     bounds: Bounds,
 ) -> tuple[Check, ...]:
     """Whether the residual follows an input, and is white where the noise was."""
-    checks = []
-    least = bounds.chance or FALSE_ALARM
-    worst = float(scipy.special.chdtri(1, least))
+    checks, fs, least = [], aligned.fs, bounds.chance or FALSE_ALARM
+    # At worst the model's error lies in one direction: its square is chi-squared with 1.
+    error = float(np.mean(model_std[scored] ** 2))
+    most = float(scipy.special.chdtri(1, least)) * error
     for pair, model in zip(pairs, models, strict=True):
         u = aligned.signal(pair.input).values
-        band = excited_band(u, aligned.fs)
-        left = misfit(
-            u,
-            residual,
-            delay=model.delay * aligned.fs,
-            band=(band[0] / aligned.fs, band[1] / aligned.fs),
-        )
-        power = left.share * _power_in(residual, band, aligned.fs) / np.mean(scored)
-        # At worst one direction makes up the model's error: its square is chi-squared with 1.
-        admitted = power <= worst * float(np.mean(model_std[scored] ** 2))
+        low, high = excited_band(u, fs)
+        left = misfit(u, residual, delay=model.delay * fs, band=(low / fs, high / fs))
+        admitted = left.share * _power_in(residual, (low, high), fs) / np.mean(scored) <= most
         name = f"follows_{pair.input}" if len(pairs) > 1 else "follows_input"
-        told = (
+        result = (
             f"The residual does not follow {pair.input!r}"
             if left.probability >= least
             else f"{percent(left.share)} % of the residual's power follows {pair.input!r}"
@@ -452,7 +435,7 @@ def _tests(
                 value=left.probability,
                 low=None if admitted else bounds.chance,
                 high=None,
-                message=f"{told} (p-value {_p_value(left.probability, least)}).",
+                message=f"{result} (p-value {_p_value(left.probability, least)}).",
             )
         )
     white = float(ljung_box(residual[scored] - residual[scored].mean()))
@@ -461,30 +444,28 @@ def _tests(
         for pair in pairs
         for warning in pair.warnings
     )
-    quiet = float(np.mean(model_std[scored] ** 2)) < MATERIAL * models[0].noise_std ** 2
-    checks.append(
-        Check(
-            name="whiteness",
-            value=white,
-            low=bounds.chance if quiet and not coloured else None,
-            high=None,
-            message="The residual is "
-            + ("white" if white >= least else "coloured")
-            + (", as the noise was" if coloured and white < least else "")
-            + f" (p-value {_p_value(white, least)}).",
-        )
+    quiet = error < MATERIAL * models[0].noise_std ** 2
+    colour = "white"
+    if white < least:
+        colour = "coloured, as the noise was" if coloured else "coloured"
+    whiteness = Check(
+        name="whiteness",
+        value=white,
+        low=bounds.chance if quiet and not coloured else None,
+        high=None,
+        message=f"The residual is {colour} (p-value {_p_value(white, least)}).",
     )
-    return tuple(checks)
+    return (*checks, whiteness)
 
 
 def _p_value(value: float, least: float) -> str:
-    """A p-value in words: below the least that counts, how far below says nothing."""
+    """A p-value in words; below the least that counts only that bound."""
     least = min(least, FALSE_ALARM)
     return f"{value:.2g}" if value >= least else f"below {least:g}"
 
 
 def _power_in(residual: Real, band: tuple[float, float], fs: float) -> float:
-    """Mean square of what lies in a band, in Hz."""
+    """Mean square of a residual in a band in Hz."""
     n = residual.size
     spectrum = np.abs(scipy.fft.rfft(residual)) ** 2
     f = np.arange(spectrum.size) * fs / n
