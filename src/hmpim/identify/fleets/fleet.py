@@ -242,7 +242,6 @@ def _group_of(
         if name in SIZES:  # an interval over several models may be too wide for a figure
             wide_open = column.high - column.low > PART * np.abs(column.value)
             sound &= ~(np.isnan(column.std) & wide_open)
-    for name, column in spanned.items():
         if name.startswith("bandwidth"):
             beyond = column.value > fleet.highest
             for end in _ENDS:
@@ -300,7 +299,7 @@ def _columns(
 
 
 def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
-    """Let the intervals of one record cover those from `spanned`, `tails`, in addition."""
+    """Let the intervals of one record cover `tails`, which `spanned` made from `own`."""
     for name, column in columns.items():
         tail = getattr(tails, name)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):
