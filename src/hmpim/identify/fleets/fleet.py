@@ -299,7 +299,7 @@ def _columns(
 
 
 def widen(columns: dict[str, Column], i: int, own: Parameters, tails: Parameters) -> None:
-    """Let the intervals of one record cover `tails`, which `spanned` made from its `own` ones."""
+    """Let the intervals of one record cover `tails`, which `spanned` made from `own`."""
     for name, column in columns.items():
         tail = getattr(tails, name)
         if tail is None or tail.ci95 is None or tail is getattr(own, name):
