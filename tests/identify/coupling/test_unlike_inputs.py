@@ -119,3 +119,14 @@ def test_no_search_is_spent_on_an_input_that_a_wobble_resembles(monkeypatch, fre
     assert any(np.array_equal(u, moving) for u in searched)
     assert not any(np.array_equal(u, still) for u in searched)
     assert found["y", "still"].verdict == "not_identifiable"
+
+
+def test_responses_are_measured_at_the_delay_of_the_leading_input():
+    """Of an input that comes first, matters less and acts late, the delay is not the output's."""
+    rng = np.random.default_rng(0)
+    lesser, leading = binary(3, 10), sweep()
+    late = np.concatenate([np.zeros(350), lesser[:-350]])
+    y = leading + 0.4 * late + 0.02 * rng.standard_normal(SAMPLES)
+    record = hmpim.Record.from_arrays({"b": lesser, "a": leading}, {"y": y}, fs=FS)
+    response = hmpim.identify(record)["y", "a"].frequency_response.response
+    assert np.median(np.abs(response - 1.0)) < 0.1

@@ -127,9 +127,8 @@ def _pieces(
     band is subtracted by its model.
     """
     # One delay for all inputs: shifting them relative to each other would make them look different.
-    kept = [fit for fit, strong in zip(joined.fits, joined.strong, strict=True) if strong]
-    strongest = min(kept or joined.fits, key=lambda fit: fit.best.fit.cost).best.fit
-    delay = min(max(strongest.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
+    leading = joined.fits[joined.leading].best.fit
+    delay = min(max(leading.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
     y, whole = output.values, joined.prediction
     if joined.disturbance is not None:
