@@ -126,19 +126,17 @@ def looked_through(
     plain: Fit | None,
 ) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
     """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity."""
+    modelled = joined.bending is not None
+    problem, fit = joint.problem, joint.best.fit
     if joined.bending is not None:
-        whole = joined.bending.as_measured(joint)
-        inspection, unseen = attempt(
-            "nonlinearity",
-            lambda: _inspected(question, found, *whole, i, None, modelled=True),
-            None,
-        )
-        return joint, inspection, unseen
+        problem, fit = joined.bending.as_measured(joint)
     inspection, unseen = attempt(
         "nonlinearity",
-        lambda: _inspected(question, found, joint.problem, joint.best.fit, i, plain),
+        lambda: _inspected(question, found, problem, fit, i, plain, modelled=modelled),
         None,
     )
+    if modelled:
+        return joint, inspection, unseen
     if inspection is not None and inspection.fit is not joint.best.fit:
         return taking(joint, inspection.fit), inspection, unseen
     if plain is None:

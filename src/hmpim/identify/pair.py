@@ -148,8 +148,9 @@ def _pair(
         "misfit", lambda: _left(question, joint, i, matrix), Misfit(share=0.0, probability=1.0)
     )
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
-    bent = 0.0 if inspection is None or not said else inspection.summary.nonlinear
-    bent = bent if joined.bending is None else 0.0
+    bent = 0.0
+    if inspection is not None and said and joined.bending is None:
+        bent = inspection.summary.nonlinear
     evidence = replace(
         evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
     )

@@ -164,6 +164,10 @@ class Problem:
         bias = np.ones((1, self.y.size))
         return bias if self.nuisance is None else np.vstack([bias, self.nuisance])
 
+    def with_row(self, row: Real) -> "Problem":
+        """The same with one more nuisance row, (n,), which comes last."""
+        return replace(self, nuisance=np.vstack([self.fixed()[1:], row]))
+
 
 class Driven:
     """Responses to the input, `rows`, (m, n), one for each coefficient of the numerator.

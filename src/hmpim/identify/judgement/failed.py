@@ -22,7 +22,7 @@ def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Fi
     """
     try:
         return look(), ()
-    except Exception as error:
+    except Exception as error:  # whatever it is, the result stands without this check
         return otherwise, (failed(name, error),)
 
 

@@ -174,7 +174,7 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
         deviance = data.counted * float(np.log(before.cost / fit.cost))
         if deviance < least:  # of the samples that count some come and go
             nearest, least = one, deviance
-        if one.again is None or least < MATERIAL:
+        if least < MATERIAL:
             break
         tried.append(at)
         changes.append(np.append(fit.theta, fit.nuisance[-1] / scale) - at)
@@ -246,8 +246,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
     out = np.zeros((vector.size, problem.y.size))
-    again = one.again
-    if again is None or (one.kind == "friction" and fit.structure.name != "second_order"):
+    if one.kind == "friction" and fit.structure.name != "second_order":
         return out
 
     def effect(at: Real) -> Real:
@@ -262,7 +261,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
             nuisance=nuisance,
             prediction=x + nuisance @ problem.fixed()[1:],
         )
-        return np.asarray(fit.nuisance[-1] * again(problem, moved).row)
+        return np.asarray(fit.nuisance[-1] * one.again(problem, moved).row)
 
     for i, step in enumerate(scale):
         aside = np.zeros(vector.size)

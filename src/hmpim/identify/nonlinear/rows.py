@@ -57,7 +57,7 @@ class Nonlinearity:
         Name as in `hmpim.identify.nonlinear.mechanisms`.
     row : ndarray, shape (n,)
         Its effect on the output.
-    again : callable or None
+    again : callable
         Makes the row anew from the data with this row and the fit to them.
     counts : ndarray of bool, shape (n,), or None
         Samples that depend on the linear part; None if all do.
@@ -69,7 +69,7 @@ class Nonlinearity:
 
     kind: Kind
     row: Real
-    again: Callable[[Problem, Fit], "Nonlinearity"] | None = None
+    again: Callable[[Problem, Fit], "Nonlinearity"]
     counts: Mask | None = None
     size: float = 0.0
     begins: int = 0
@@ -77,12 +77,10 @@ class Nonlinearity:
 
 def with_row(problem: Problem, one: Nonlinearity) -> Problem:
     """The data with the row, without samples that do not count."""
-    known = problem.nuisance
-    rows = one.row[None] if known is None else np.vstack([known, one.row])
     valid = problem.valid
     if one.counts is not None:
         valid = one.counts if valid is None else valid & one.counts
-    return replace(problem.plain, nuisance=rows, valid=valid)
+    return replace(problem.plain, valid=valid).with_row(one.row)
 
 
 def first_rows(
@@ -127,8 +125,8 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | 
         lived = sampled(np.sign(fine) * np.maximum(np.abs(fine) - half, 0.0))
         source = prepare_input(lived, "bandlimited", rest=problem.begins is None)
         edges = sampled(np.sign(fine) * (np.abs(fine) > half))
-        row = _through_model(edges, problem, fit)
-        data = with_row(replace(problem, source=source), Nonlinearity(kind="dead_zone", row=-row))
+        slope = -_through_model(edges, problem, fit)
+        data = replace(problem.plain, source=source).with_row(slope)
         fit = fit_structure(data, structure, fit.theta)
         change = float(fit.nuisance[-1])
         half = float(np.clip(half + change, PART * half, half / PART))

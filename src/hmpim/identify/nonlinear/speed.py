@@ -186,7 +186,7 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
     if least.cost > min(TWICE * best.cost, start.cost):
         return None
     problem = command.at(speed)
-    free = _with_row(problem, command.slope(speed, least))
+    free = problem.with_row(command.slope(speed, least))
     fits = (least, fit_structure(free, least.structure, least.theta))
     if max(_log_odds(problem, fit, command.problem, best) for fit in fits) <= 0.0:
         return None
@@ -227,7 +227,7 @@ def with_free_speed(joint: JointFit, slope: Real) -> JointFit:
 
     It fits the followed command; `slope`, (n,), is the derivative of the output by the speed.
     """
-    problem = _with_row(joint.problem, slope)
+    problem = joint.problem.with_row(slope)
     weighed = replace(joint.weighed, nuisance=problem.nuisance)
     structure, theta = joint.best.fit.structure, joint.best.fit.theta
     fit = fit_structure(weighed, structure, theta, precision=weighed.final)
@@ -239,12 +239,6 @@ def with_free_speed(joint: JointFit, slope: Real) -> JointFit:
         best=best,
         trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
     )
-
-
-def _with_row(problem: Problem, slope: Real) -> Problem:
-    """The data with one more nuisance row."""
-    rows = () if problem.nuisance is None else problem.nuisance
-    return replace(problem, nuisance=np.vstack([*rows, slope]))
 
 
 def _followed(fine: Real, step: float) -> Real:
