@@ -10,6 +10,7 @@ from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import fit, started
 from hmpim.identify.fitting.course import completed, turn_ahead
+from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
@@ -25,7 +26,8 @@ from hmpim.identify.nonlinear.modelled import (
     settled_rows,
 )
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
-from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
+from hmpim.identify.nonlinear.rows import Command, Nonlinearity
+from hmpim.identify.nonlinear.rows import with_row as nonlinear_row
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import ROUNDING, WORTH
@@ -97,6 +99,9 @@ def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputF
         command = Command(u=source.values, intersample=course.natural)
         for kind in kinds_in_question(command, problem, course.best, joint.best.fit):
             for one in settled_rows(kind, command, problem, course.best):
+                leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
+                if not _is_promising(one, problem, course.best, leading, joint.problem, 1 - known):
+                    continue
                 beside = _with_row(steady, seen, problem, one)
                 gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
                 if beside.related and leaves_noise(beside, one) and gain > most:
@@ -113,8 +118,20 @@ def _with_row(
     """Fit every structure with a row for a nonlinearity."""
     valid = question.output.valid if one.counts is None else question.output.valid & one.counts
     question = replace(question, output=replace(question.output, valid=valid))
-    course = turn_ahead(started(question, seen, with_row(problem, one).nuisance))
+    course = turn_ahead(started(question, seen, nonlinear_row(problem, one).nuisance))
     return chosen_of(completed(course), question.structures)
+
+
+def _is_promising(
+    one: Nonlinearity, problem: Problem, plain: Fit, joint: JointFit, former: Problem, count: int
+) -> bool:
+    """Whether the row makes plain dynamics suffice, or is worth its price with those that lead."""
+    if refit(nonlinear_row(problem, one), plain).is_white:
+        return True
+    best = joint.best.fit
+    data = nonlinear_row(joint.problem, one)
+    rich = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, best)))
+    return criterion_gain(rich, count, best, former) > 0.0
 
 
 def looked_through(

@@ -23,7 +23,7 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import TWICE, WORTH
+from hmpim.identify.worth import PART, TWICE, WORTH
 
 __all__ = ["GainChange", "Scored", "changing_gain", "scored"]
 
@@ -268,15 +268,17 @@ def _settled(
                 return None
             score = max(again, key=lambda one: one.gain)
             rates = tuple(score.rate * spread ** np.linspace(-1.0, 1.0, _FINELY))
+        # Compared with the residual of the undivided output, whose noise is even.
+        even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
+        whole = replace(joint, best=even)
+        gained = criterion_gain(whole, len(score.rows), first.best.fit, first.problem)
+        if plainly and gained < -2 * CLEARLY / PART:
+            break  # further rounds change only a part of it
         spread **= 2.0 / (_FINELY - 1)
-    # Compared with the residual of the undivided output, whose noise is even.
-    even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
     return _Settled(
         joint=joint,
         score=replace(score, std=_deviation(data, constant, score)),
-        gained=criterion_gain(
-            replace(joint, best=even), len(score.rows), first.best.fit, first.problem
-        ),
+        gained=gained,
         course=course,
         level=level,
     )
