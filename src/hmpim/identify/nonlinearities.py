@@ -26,8 +26,7 @@ from hmpim.identify.nonlinear.modelled import (
     settled_rows,
 )
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
-from hmpim.identify.nonlinear.rows import Command, Nonlinearity
-from hmpim.identify.nonlinear.rows import with_row as nonlinear_row
+from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import ROUNDING, WORTH
@@ -51,7 +50,7 @@ def model_nonlinearity(
     question, fitted = _limit_speed(question, seen, fitted)
     if question.limited is not None:
         return question, fitted
-    return question, _with_nonlinear_row(question, seen, fitted)
+    return question, _with_with_row(question, seen, fitted)
 
 
 def _limit_speed(
@@ -77,7 +76,7 @@ def _limit_speed(
     return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
 
 
-def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
+def _with_with_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
     """Add a row for backlash, a dead zone, friction, a spring or a bent scale if it leaves noise.
 
     Not for clipped or held outputs, and not together with a changing gain.
@@ -102,7 +101,7 @@ def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputF
                 leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
                 if not _is_promising(one, problem, course.best, leading, joint.problem, 1 - known):
                     continue
-                beside = _with_row(steady, seen, problem, one)
+                beside = _fitted_with(steady, seen, problem, one)
                 gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
                 if beside.related and leaves_noise(beside, one) and gain > most:
                     kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
@@ -112,13 +111,13 @@ def _with_nonlinear_row(question: Question, seen: Imperfections, fitted: OutputF
     return lead
 
 
-def _with_row(
+def _fitted_with(
     question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
 ) -> JointFit:
     """Fit every structure with a row for a nonlinearity."""
     valid = question.output.valid if one.counts is None else question.output.valid & one.counts
     question = replace(question, output=replace(question.output, valid=valid))
-    course = turn_ahead(started(question, seen, nonlinear_row(problem, one).nuisance))
+    course = turn_ahead(started(question, seen, with_row(problem, one).nuisance))
     return chosen_of(completed(course), question.structures)
 
 
@@ -126,10 +125,10 @@ def _is_promising(
     one: Nonlinearity, problem: Problem, plain: Fit, joint: JointFit, former: Problem, count: int
 ) -> bool:
     """Whether the row makes plain dynamics suffice, or is worth its price with those that lead."""
-    if refit(nonlinear_row(problem, one), plain).is_white:
+    if refit(with_row(problem, one), plain).is_white:
         return True
     best = joint.best.fit
-    data = nonlinear_row(joint.problem, one)
+    data = with_row(joint.problem, one)
     rich = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, best)))
     return criterion_gain(rich, count, best, former) > 0.0
 
