@@ -81,7 +81,7 @@ def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
     for name in _TOLD:
         if name in group.alone:
             column = group.alone[name]
-            known &= column.std <= MUCH * np.abs(column.value)
+            known &= np.isnan(column.value) | (column.std <= MUCH * np.abs(column.value))
     delay = group.alone["delay"]
     known &= (delay.value > 0) & (delay.std <= np.maximum(BLURRED / fs, MUCH * delay.value))
     # The slower of two poles, 1 + 2ζ s/ω + s²/ω².
