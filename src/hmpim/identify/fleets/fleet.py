@@ -33,7 +33,7 @@ from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.reading.figures import units_of
-from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.result import Estimate, Parameters, fit_percent
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
@@ -182,7 +182,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
         sound=sound,
         intersample=tuple(fleet.members[k].intersample for k in chosen.tolist()),
         codes=tuple(codes),
-        fit_percent=100.0 * (1.0 - np.sqrt(cost / np.maximum(power, np.finfo(float).tiny))),
+        fit_percent=fit_percent(cost, power),
         groups=tuple(groups),
     )
 

@@ -39,7 +39,13 @@ from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.reading.spanned import spanned
-from hmpim.identify.result import Candidate, Nonlinearity, PairIdentification, Parameters
+from hmpim.identify.result import (
+    Candidate,
+    Nonlinearity,
+    PairIdentification,
+    Parameters,
+    fit_percent,
+)
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
@@ -274,7 +280,7 @@ def _candidates(
             structure=structure.name,
             intersample=mode,
             criterion=float(n * np.log(cost / n) + structure.parameters * np.log(n)),
-            fit_percent=float(100.0 * (1.0 - np.sqrt(cost / power))),
+            fit_percent=float(fit_percent(cost, power)),
             chosen=chosen,
         )
         for structure, mode, cost, chosen in tried

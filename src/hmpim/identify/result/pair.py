@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, overload
 
+import numpy as np
+
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Real
 from hmpim.identify.result.digits import interval
@@ -14,15 +16,15 @@ from hmpim.identify.result.plain import Plain, by_fields, plain
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
-__all__ = ["Candidate", "PairIdentification", "pair_rows"]
+__all__ = ["Candidate", "PairIdentification", "fit_percent", "pair_rows"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate(Plain):
     """One structure that was tried: how well it fits, and its criterion.
 
-    `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
-    100 (1 - ||y - ŷ|| / ||y - mean y||).
+    `criterion` is the Bayesian information criterion, lower is better; for `fit_percent` see the
+    function of that name.
     """
 
     structure: str
@@ -30,6 +32,19 @@ class Candidate(Plain):
     criterion: float
     fit_percent: float
     chosen: bool = False
+
+
+def fit_percent(left: Real | float, spread: Real | float) -> Real:
+    """Return 100 (1 - ||y - ŷ|| / ||y - mean y||) from both sums of squares; 0 for a constant y.
+
+    Examples
+    --------
+    >>> float(fit_percent(0.01, 1.0)), float(fit_percent(1.0, 0.0))
+    (90.0, 0.0)
+    """
+    shape = np.broadcast_shapes(np.shape(left), np.shape(spread))
+    share = np.divide(left, spread, out=np.ones(shape), where=np.greater(spread, 0.0))
+    return np.asarray(100.0 * (1.0 - np.sqrt(share)))
 
 
 class _Figure:
