@@ -12,7 +12,7 @@ from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
-from hmpim.identify.result.plain import Plain, by_fields, plain
+from hmpim.identify.result.plain import Plain, by_fields, fields_in
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
@@ -119,27 +119,10 @@ class PairIdentification(ByValue, Plain):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the pair as plain JSON values, an entry of `Identification.to_dict`."""
-        return {
-            "input": self.input,
-            "output": self.output,
-            "structure": self.structure,
-            "intersample": self.intersample,
-            "fit_percent": self.fit_percent,
-            "parameters": plain(self.parameters),
-            "paper": plain(self.paper),
-            "frequency_response": plain(self.frequency_response),
-            "bandwidths_from_response": plain(self.from_response),
-            "dynamics": {
-                "numerator": plain(self.numerator),
-                "denominator": plain(self.denominator),
-                "covariance": plain(self.covariance),
-            },
-            "candidates": plain(self.candidates),
-            "nonlinearity": plain(self.nonlinearity),
-            "verdict": self.verdict,
-            "warnings": plain(self.warnings),
-            "stopping": plain(self.stopping),
-        }
+        own = fields_in(self)
+        dynamics = {name: own.pop(name) for name in ("numerator", "denominator", "covariance")}
+        response = own.pop("from_response")
+        return {**own, "bandwidths_from_response": response, "dynamics": dynamics}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":
