@@ -295,7 +295,7 @@ def _levels(
     results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
 ) -> list[_Level]:
     """Amplitudes, the smallest first, and the parameters identified there."""
-    _check_number(len(results), len(amplitudes), of="result")
+    _check_number(len(results), len(amplitudes), of="level")
     for amplitude in amplitudes:
         if not (np.isfinite(amplitude) and amplitude > 0):
             raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
