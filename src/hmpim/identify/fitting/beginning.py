@@ -147,7 +147,9 @@ def first_answers(delays: Real, lags: NDArray[np.intp], samples: int) -> NDArray
     return np.ceil(np.maximum(np.maximum(delays, late), 0.0)).astype(np.intp) + REACH
 
 
-def needs_free(power: Real | float, left: Real | float, count: Real | float, modes: int) -> Mask:
+def needs_free(
+    power: Real | float, left: Real | float, count: NDArray[np.intp] | float, modes: int
+) -> Mask:
     """Which residuals' power, (...,), free responses of so many modes lower by more than chance.
 
     With them `left` remains; `count` samples are independent.

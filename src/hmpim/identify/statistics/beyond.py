@@ -78,11 +78,11 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     cost -= float(residual @ solved(first.gram, residual))
     size = np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0)
     almost_binary = float(np.mean(np.diag(left) / size)) < MUCH  # its edges are between the samples
-    power, count = explained(left, gain, least=_SEEN, size=size)
-    if almost_binary or not count or cost <= 0.0:
+    power, determined = explained(left, gain, least=_SEEN, size=size)
+    if almost_binary or not determined or cost <= 0.0:
         return Misfit(share=0.0, probability=1.0)
-    freedom = products.counted - linear.rows.shape[0] - int(count)
-    return explained_by(float(power), int(count), cost, freedom)
+    freedom = products.counted - linear.rows.shape[0] - int(determined)
+    return explained_by(float(power), int(determined), cost, freedom)
 
 
 def _ending(rows: Real) -> Responses:
