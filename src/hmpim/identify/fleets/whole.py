@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.trial import schwarz
 from hmpim.identify.fleets.fleet import (
     Column,
     Fleet,
@@ -266,7 +267,6 @@ def _candidates(
 ) -> tuple[Candidate, ...]:
     """All structures that were tried, the likeliest first."""
     fleet, i = whole.fleet, int(group.some[k])
-    n = fleet.u.size
     tried = [
         (fleet.structure, fits.member.intersample, float(fits.cost[i]), fits is group.fit)
         for fits in (group.fit, *(other for other, _ in group.others))
@@ -279,7 +279,7 @@ def _candidates(
         Candidate(
             structure=structure.name,
             intersample=mode,
-            criterion=float(n * np.log(cost / n) + structure.parameters * np.log(n)),
+            criterion=schwarz(cost, fleet.u.size, structure.parameters),
             fit_percent=float(fit_percent(cost, power)),
             chosen=chosen,
         )
