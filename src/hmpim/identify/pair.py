@@ -1,6 +1,5 @@
 """The description of one output and one input, made from the joint fit."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,12 +35,12 @@ from hmpim.identify.nonlinearities import looked_through, possible_bends
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
+from hmpim.identify.reading.candidates import candidates_of
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
-    Candidate,
     FrequencyResponse,
     Nonlinearity,
     OutputCoherence,
@@ -49,6 +48,7 @@ from hmpim.identify.result import (
     PaperEstimates,
     Parameters,
     ResponseBandwidths,
+    fit_percent,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
@@ -168,6 +168,7 @@ def _pair(
     gaining, disturbance = joined.gaining, joined.disturbance
     course = None if gaining is None or not gaining.taken else gaining.course
     numerator, denominator = coefficients_of(readings.system)
+    spread = _spread(joint)
     return PairIdentification(
         input=source.name,
         output=output.name,
@@ -179,7 +180,7 @@ def _pair(
         frequency_response=response,
         numerator=numerator,
         denominator=denominator,
-        candidates=_candidates(joint),
+        candidates=candidates_of(joint, lambda one: float(fit_percent(one.cost, spread))),
         warnings=(*aligned.findings, *findings),
         from_response=evidence.measured,
         time=aligned.time,
@@ -243,7 +244,7 @@ def _evidence(
         u=question.aligned.inputs[i].values,
         fs=fs,
         band=band,
-        fit_percent=_fit_percents(joint, [fit.cost])[0],
+        fit_percent=float(fit_percent(fit.cost, _spread(joint))),
         bends=moves,
         nonlinear=max((one.share for one in moves if one.certain), default=0.0),
         measured=from_response,
@@ -373,28 +374,12 @@ def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> 
     return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
 
 
-def _fit_percents(joint: JointFit, costs: Sequence[float]) -> list[float]:
-    """100 (1 - ‖residual‖ / ‖deviation of the output‖) of sums of squared residuals."""
+def _spread(joint: JointFit) -> float:
+    """Sum of squares of the samples that count about their mean."""
     problem = joint.problem
     y = problem.y if problem.valid is None else problem.y[problem.valid]
     away = y - y.mean()
-    spread = max(float(away @ away), np.finfo(float).tiny)
-    return [float(100.0 * (1.0 - np.sqrt(cost / spread))) for cost in costs]
-
-
-def _candidates(joint: JointFit) -> tuple[Candidate, ...]:
-    ordered = sorted(joint.trials, key=lambda trial: trial.criterion)
-    percents = _fit_percents(joint, [trial.fit.cost for trial in ordered])
-    return tuple(
-        Candidate(
-            structure=trial.fit.structure.name,
-            intersample=trial.intersample,
-            criterion=trial.criterion,
-            fit_percent=fit_percent,
-            chosen=trial is joint.best,
-        )
-        for trial, fit_percent in zip(ordered, percents, strict=True)
-    )
+    return float(away @ away)
 
 
 def _unrelated(

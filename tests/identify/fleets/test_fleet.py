@@ -24,15 +24,21 @@ def sweep() -> np.ndarray:
     return np.sin(2 * np.pi * (0.2 * time + 19.8 / 12 * time**2))
 
 
-def output(seed: int, delay: float = 0.03, natural: float = 6.0) -> np.ndarray:
+def output(seed: int, delay: float = 0.03, natural: float = 6.0, u=None, noise=NOISE) -> np.ndarray:
     rng = np.random.default_rng([3, seed])
     delay *= 1 + 0.03 * rng.standard_normal()
     omega = 2 * np.pi * natural * (1 + 0.03 * rng.standard_normal())
     model = hmpim.Model(
         delay=delay, scale_factor=2.0, denominator=(omega**-2, 0.8 / omega, 1.0), bias=0.3
     )
-    y = hmpim.simulate(model, sweep(), fs=FS, intersample="bandlimited")
-    return y + NOISE * rng.standard_normal(SAMPLES)
+    y = hmpim.simulate(model, sweep() if u is None else u, fs=FS, intersample="bandlimited")
+    return y + noise * rng.standard_normal(SAMPLES)
+
+
+def low_sweep() -> np.ndarray:
+    """A sweep that ends below the -3 dB bandwidth of most units."""
+    time = np.arange(SAMPLES) / FS
+    return np.sin(2 * np.pi * (0.2 * time + 6.8 / 12 * time**2))
 
 
 def alone(y: np.ndarray, intersample: str | None = None):
@@ -133,6 +139,34 @@ def test_everything_is_said_of_quiet_records_and_of_no_others(fleet):
     assert own.warnings == pair.warnings
     assert own.nonlinearity == pair.nonlinearity
     assert own.denominator == pytest.approx(pair.denominator, rel=1e-4)
+
+
+def test_a_bandwidth_beyond_the_band_is_missing_together_as_it_is_alone():
+    """It is not read off, and a record that lacks it is not left to `identify` for that."""
+    u, band = low_sweep(), (0.2, 7.0)
+
+    def measured(seed: int) -> np.ndarray:
+        return output(seed, u=u, noise=0.02)
+
+    def single(seed: int):
+        record = hmpim.Record.from_arrays(
+            {"u": u}, {"y": measured(seed)}, fs=FS, intersample="bandlimited", band=band
+        )
+        return hmpim.identify(record)["y", "u"]
+
+    pairs = [single(seed) for seed in range(8)]
+    fleet = learn_fleet(u, pairs, fs=FS, band=band)
+    assert "bandwidth_3db" in fleet.names
+    whole = learn_whole(fleet, pairs)
+    assert whole is not None
+    every = np.stack([measured(seed) for seed in (40, 41)])
+    found = whole_pairs(whole, fit_fleet(fleet, every), every)
+    for seed, own in zip((40, 41), found, strict=True):
+        pair = single(seed)
+        assert own.bandwidth_3db is None
+        assert pair.bandwidth_3db is None
+        assert own.warnings == pair.warnings
+        assert own.verdict == pair.verdict
 
 
 def test_intervals_cover_a_nonlinearity_that_looks_likely_by_chance_as_they_do_alone(fleet):

@@ -105,7 +105,7 @@ def test_what_a_level_cannot_tell_is_left_out():
 
 
 def test_bad_levels_are_refused():
-    with pytest.raises(ArgumentError, match="2 results and 1 amplitudes"):
+    with pytest.raises(ArgumentError, match="2 levels and 1 amplitudes"):
         compare_levels([level(1, 1), level(1, 1)], [1.0])
     with pytest.raises(ArgumentError, match="1 level has nothing"):
         compare_levels([level(1, 1)], [1.0])

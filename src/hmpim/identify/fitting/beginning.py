@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
@@ -25,8 +26,11 @@ __all__ = [
     "begin_later",
     "begins_of",
     "count_in",
+    "first_answers",
     "in_motion",
     "look_again",
+    "needs_free",
+    "ringing",
     "ringing_of",
     "stand_out_of",
 ]
@@ -101,8 +105,7 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     them answer input before the record. A fit that wrongly assumes rest may have any delay, so
     the later of its delay and `lag`, the lag of the cross-correlation, is taken.
     """
-    latest = max(fit.delay, float(lag) if lag <= problem.y.size * PART else 0.0, 0.0)
-    begins = int(np.ceil(latest)) + REACH
+    begins = int(first_answers(np.array(fit.delay), np.array(lag), problem.y.size))
     if begins > longest_lag(problem.y.size) or fit.objective <= 0.0:
         return None
     late = np.arange(problem.y.size) >= begins
@@ -125,10 +128,8 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     if power <= 0.0:
         return None
     gained = float(moment @ solved(after[:-1, :-1], moment))
-    remaining = max(power - gained, np.finfo(float).tiny)
-    limit = float(scipy.special.chdtri(len(part.free), FALSE_ALARM))
-    statistic = share * count * float(np.log(power) - np.log(remaining))
-    if statistic > limit:
+    modes = len(part.free)
+    if needs_free(power, power - gained, share * count, modes):
         return begins
     if share == 1.0 or fit.objective != fit.cost:  # a whitened fit is not the best unwhitened one
         return None
@@ -136,8 +137,26 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     free = refit(replace(problem, valid=valid, begins=begins), fit)
     if free.objective <= 0.0:
         return begins
-    statistic = free.share * count * float(np.log(power) - np.log(free.objective))
-    return begins if statistic > limit else None
+    needed = needs_free(power, free.objective, free.share * count, modes)
+    return begins if needed else None
+
+
+def first_answers(delays: Real, lags: NDArray[np.intp], samples: int) -> NDArray[np.intp]:
+    """First samples, (...,), that answer only input of the record, as in `begins_of`."""
+    late = np.where(lags <= PART * samples, lags, 0)
+    return np.ceil(np.maximum(np.maximum(delays, late), 0.0)).astype(np.intp) + REACH
+
+
+def needs_free(
+    power: Real | float, left: Real | float, count: NDArray[np.intp] | float, modes: int
+) -> Mask:
+    """Which residuals' power, (...,), free responses of so many modes lower by more than chance.
+
+    With them `left` remains; `count` samples are independent.
+    """
+    tiny = np.finfo(float).tiny
+    fell = np.log(np.maximum(power, tiny)) - np.log(np.maximum(left, tiny))
+    return np.asarray(count * fell > scipy.special.chdtri(modes, FALSE_ALARM))
 
 
 def look_again(
@@ -163,12 +182,12 @@ def look_again(
     )  # after division by the level, no end would stand out
     if trial.intersample == "bandlimited":
         reach = ringing_of(problem.source)
-        ringing = _ringing(count, trial.fit.delay, reach)
-        if problem.is_coloured and is_white(trial.fit.residual[every & ~ringing]):
+        ends = ringing(count, trial.fit.delay, reach)
+        if problem.is_coloured and is_white(trial.fit.residual[every & ~ends]):
             innovations = trial.fit.residual  # only the ends are coloured
-        if _stands_out(innovations, every & ringing, every & ~ringing):
-            ringing = _until_quiet(innovations, every, ringing, trial.fit.delay, reach)
-            return replace(seen, valid=~ringing if seen.valid is None else seen.valid & ~ringing)
+        if _stands_out(innovations, every & ends, every & ~ends):
+            ends = _until_quiet(innovations, every, ends, trial.fit.delay, reach)
+            return replace(seen, valid=~ends if seen.valid is None else seen.valid & ~ends)
     if known is not None:
         clear = _of_measured(trial.fit, every, known)
         if clear is not every:
@@ -190,13 +209,13 @@ def _until_quiet(innovations: Real, every: Mask, first: Mask, delay: float, reac
     Ringing dies away within a twentieth of the record; anything longer has another cause, and
     only the `first` samples are then returned.
     """
-    ringing, count = first, innovations.size
+    known, count = first, innovations.size
     while reach < FEW * count:
         reach *= 2
-        wider = _ringing(count, delay, reach)
-        if not _stands_out(innovations, every & wider & ~ringing, every & ~wider):
-            return ringing
-        ringing = wider
+        wider = ringing(count, delay, reach)
+        if not _stands_out(innovations, every & wider & ~known, every & ~wider):
+            return known
+        known = wider
     return first
 
 
@@ -209,8 +228,11 @@ def ringing_of(source: SampledInput) -> int:
     return MARGIN if finer else _RINGS
 
 
-def _ringing(count: int, delay: float, reach: int) -> Mask:
-    """Samples that answer input within `reach` of either end of the record."""
+def ringing(count: int, delay: Real | float, reach: int) -> Mask:
+    """Samples that answer input within `reach` of either end of the record, (n,).
+
+    For delays of shape (k, 1) those of each are returned, (k, n).
+    """
     late = np.arange(count) - delay
     return np.asarray((np.abs(late) <= reach) | (late >= count - 1 - reach))
 

@@ -21,7 +21,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
 from hmpim.identify.fitting.derivatives import combined, products
 from hmpim.identify.fitting.fit import Fit, Problem, within_reach
-from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.least_squares import added
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
@@ -199,9 +199,11 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     halves = products(problem, fit, residual, row, edges=(residual.size // 2,))
     gram = halves.sum(axis=0)
     freedom = max(problem.counted - gram.shape[0] + 1, 1)
-    shift = -solved(gram[:-2, :-2], gram[:-2, -2])
     # Of the row's part that no other parameter can make: power, and product with the residual.
-    power, along = (float(gram[-2, k] + shift @ gram[:-2, k]) for k in (-2, -1))
+    shift, left, gain = added(
+        gram[:-2, :-2], gram[:-2, -2], gram[-2, -2], gram[:-2, -1], gram[-2, -1]
+    )
+    power, along = float(left), float(gain)
     white = is_white(problem.counting(residual))
     variance = float(gram[-1, -1]) / freedom / max(power, _TINY)
     if not white or power <= _TOLD * gram[-2, -2]:  # the difference of products is too small

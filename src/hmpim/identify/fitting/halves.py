@@ -13,8 +13,12 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.least_squares import explained
 
 __all__ = ["Halves", "compare_halves", "halves_of", "products_of_halves"]
+
+_DETERMINED = 1e-8
+"""Share of the greatest direction, below which a half does not determine a direction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,20 +96,12 @@ def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
         Independent samples per sample.
     """
     count, p = halves.shape[1], halves.shape[-1] - 1
-    tiny = np.finfo(float).tiny
     variance = halves[:, :, p, p].sum(axis=0) / max(samples - p, 1)
     statistic, degrees = np.zeros(count), np.zeros(count)
     for half in halves:
-        gram, slope = half[:, :p, :p], half[:, :p, p]
-        scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), tiny))
-        values, vectors = np.linalg.eigh(gram / (scale[:, :, None] * scale[:, None, :]))
-        determined = values > 1e-8 * values[:, -1:]
-        along = (vectors.transpose(0, 2, 1) @ (slope / scale)[:, :, None])[:, :, 0]
-        gained = np.sum(
-            np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1
-        )
+        gained, determined = explained(half[:, :p, :p], half[:, :p, p], least=_DETERMINED)
         statistic += np.minimum(gained, half[:, p, p])
-        degrees += np.count_nonzero(determined, axis=1)
+        degrees += determined
     noisy = variance > 0
     free = np.maximum(degrees - p, 1)
     chance = scipy.special.chdtrc(free, share * statistic / np.where(noisy, variance, 1.0))

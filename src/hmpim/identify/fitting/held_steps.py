@@ -15,7 +15,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 
-__all__ = ["at_ends", "kept_in_sample", "steps_through"]
+__all__ = ["at_ends", "in_whole_samples", "kept_in_sample", "steps_through"]
 
 _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
@@ -29,6 +29,11 @@ def steps_through(structure: Structure, *, held: bool) -> bool:
     if not held or structure.sampled or structure.parallel or structure.integrators:
         return False
     return structure.order > 0 and structure.zeros == structure.order
+
+
+def in_whole_samples(structure: Structure, *, held: bool) -> bool:
+    """Whether samples fix a delay to one sample: of a held input, if the output steps with it."""
+    return held and (structure.name == "static" or steps_through(structure, held=True))
 
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:

@@ -2,10 +2,11 @@
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real
 
-__all__ = ["UNSEEN", "inverted", "solved", "solved_exactly", "without"]
+__all__ = ["UNSEEN", "added", "explained", "inverted", "solved", "solved_exactly", "without"]
 
 UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not determine a direction."""
@@ -65,6 +66,44 @@ def inverted(gram: Real) -> Real:
     values = np.abs(values)
     values = np.maximum(values, max(_EXACTLY * values.max(), np.finfo(float).tiny))
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+
+
+def added(gram: Real, mixed: Real, own: Real, cross: Real, along: Real) -> tuple[Real, Real, Real]:
+    """More rows in addition to those of a model, as a score test needs them.
+
+    `gram`, (k, k), and `cross`, (k,), are products of the model's rows among them and with the
+    residual; `own`, (q, q), and `along`, (q,), those of the added rows; `mixed`, (q, k), of both.
+    For a single row these are numbers and `mixed` is (k,).
+
+    Returned are how the model's parameters change with the weights of the added rows, (k, q); and
+    the products of the added rows, the model's own projected out, among them and with the residual.
+    """
+    shift = -solved(gram, mixed.T)
+    return shift, own + mixed @ shift, along + shift.T @ cross
+
+
+def explained(
+    gram: Real, moment: Real, *, least: float, size: Real | None = None
+) -> tuple[Real, NDArray[np.intp]]:
+    """Power of residuals that rows explain, (...,), and the directions that they determine.
+
+    Parameters
+    ----------
+    gram, moment : ndarray, shapes (..., k, k) and (..., k)
+        Products of the rows among them, and with the residuals.
+    least : float
+        Share of the greatest eigenvalue below which a direction is not determined, rows scaled to
+        unit power.
+    size : ndarray, shape (..., k), optional
+        Power of each row before the scaling, if it is not on the diagonal of `gram`.
+    """
+    power = np.diagonal(gram, axis1=-2, axis2=-1) if size is None else size
+    scale = np.sqrt(np.maximum(power, np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(gram / (scale[..., :, None] * scale[..., None, :]))
+    determined = values > least * (values[..., -1:] if size is None else 1.0)
+    along = (vectors.swapaxes(-1, -2) @ (moment / scale)[..., None])[..., 0]
+    each = np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0)
+    return np.sum(each, axis=-1), np.count_nonzero(determined, axis=-1)
 
 
 def without(rows: Real, others: Real) -> Real:

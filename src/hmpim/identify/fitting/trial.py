@@ -11,7 +11,7 @@ from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.identify.worth import MUCH
 from hmpim.record import Intersample
 
-__all__ = ["JointFit", "Trial", "likeliest_of", "trial_of"]
+__all__ = ["JointFit", "Trial", "likeliest_of", "schwarz", "trial_of"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,14 +76,18 @@ class JointFit:
         return self.effective_share if self.weighed.noise is None else 1.0
 
 
+def schwarz(cost: float, count: float, parameters: int) -> float:
+    """Schwarz's criterion of a sum of squares over so many independent samples; lower is better."""
+    return float(count * np.log(cost / count) + parameters * np.log(count))
+
+
 def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -> Trial:
     """A fit with Schwarz's criterion for `count` independent samples.
 
     Sums of squares below `floor` are only rounding, and count as `floor`.
     """
     least = max(floor, float(np.finfo(float).tiny))
-    misfit = count * np.log(max(fit.objective, least) / count)
-    criterion = float(misfit + fit.structure.parameters * np.log(count))
+    criterion = schwarz(max(fit.objective, least), count, fit.structure.parameters)
     return Trial(intersample=mode, fit=fit, criterion=criterion)
 
 

@@ -33,7 +33,7 @@ from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.reading.figures import units_of
-from hmpim.identify.result import Estimate, Parameters
+from hmpim.identify.result import Estimate, Parameters, fit_percent
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
@@ -182,7 +182,7 @@ def fit_fleet(fleet: Fleet, outputs: Real, *, units: tuple[str, str] = ("", ""))
         sound=sound,
         intersample=tuple(fleet.members[k].intersample for k in chosen.tolist()),
         codes=tuple(codes),
-        fit_percent=100.0 * (1.0 - np.sqrt(cost / np.maximum(power, np.finfo(float).tiny))),
+        fit_percent=fit_percent(cost, power),
         groups=tuple(groups),
     )
 
@@ -242,10 +242,6 @@ def _group_of(
         if name in SIZES:  # an interval over several models may be too wide for a figure
             wide_open = column.high - column.low > PART * np.abs(column.value)
             sound &= ~(np.isnan(column.std) & wide_open)
-        if name.startswith("bandwidth"):
-            beyond = column.value > fleet.highest
-            for end in _ENDS:
-                getattr(column, end)[beyond] = np.nan
     return Group(
         fit=fit,
         some=some,
@@ -268,11 +264,16 @@ def _columns(
     errors: Errors,
     units: Mapping[str, str],
 ) -> tuple[dict[str, Column], dict[str, Column]]:
-    """Figures of some fits alone, and with intervals that cover the other assumptions."""
+    """Figures of some fits alone, and with intervals that cover the other assumptions.
+
+    No bandwidth is read off beyond the band, as in `read_parameters`.
+    """
     half = float(scipy.special.stdtrit(errors.freedom, 0.975))
     alone, spanned = {}, {}
     for name, std in errors.deviations.items():
         value, unit = fit.figures[name][some], units[name]
+        beyond = name.startswith("bandwidth") & (value > fleet.highest)
+        value, std = (np.where(beyond, np.nan, x) for x in (value, std))
         column = partial(Column, value=value, unit=unit)
         moved = [np.where(on, rival.figures[name][some] - value, 0.0) for rival, on in others]
         every = np.array([0.0 * value, *moved])

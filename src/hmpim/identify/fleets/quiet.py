@@ -6,15 +6,21 @@ same functions as in `identify`, with the same chances. A record that fails any 
 """
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import EXCLUDED, FALSE_ALARM
 from hmpim.identify.effects.lost_samples import stand_out
-from hmpim.identify.fitting.beginning import REACH, ringing_of, stand_out_of
+from hmpim.identify.fitting.beginning import (
+    first_answers,
+    needs_free,
+    ringing,
+    ringing_of,
+    stand_out_of,
+)
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of, products_of_halves
+from hmpim.identify.fitting.least_squares import explained
 from hmpim.identify.fleets.fleet import Fleet, Group
 from hmpim.identify.judgement.feedback import chances_without_feedback
 from hmpim.identify.judgement.residual import folded_power
@@ -23,7 +29,7 @@ from hmpim.identify.nonlinear.harmonics import any_harmonics
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import BLURRED, FEW, MUCH, PART, WORTH
+from hmpim.identify.worth import BLURRED, FEW, MUCH, WORTH
 
 __all__ = ["are_quiet"]
 
@@ -34,6 +40,9 @@ _AT_ONCE = 16
 
 _FORGOTTEN = 40.0
 """Time constants after which a free response has vanished: e⁻⁴⁰ is rounding."""
+
+_DETERMINED = 1e-12
+"""Share of the greatest direction, below which the record does not determine a direction."""
 
 _TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
          "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
@@ -81,7 +90,7 @@ def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
     for name in _TOLD:
         if name in group.alone:
             column = group.alone[name]
-            known &= column.std <= MUCH * np.abs(column.value)
+            known &= np.isnan(column.value) | (column.std <= MUCH * np.abs(column.value))
     delay = group.alone["delay"]
     known &= (delay.value > 0) & (delay.std <= np.maximum(BLURRED / fs, MUCH * delay.value))
     # The slower of two poles, 1 + 2ζ s/ω + s²/ω².
@@ -133,16 +142,13 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     n = fleet.u.size
     left, which = group.residual[part], group.some[part]
     delay = group.fit.theta[which, 0]
-    lag = np.where(lags <= PART * n, lags, 0)
-    begins = np.ceil(np.maximum(np.maximum(delay, lag), 0.0)).astype(np.intp) + REACH
+    begins = first_answers(delay, lags, n)
     at = np.arange(n)
     early = at < begins[:, None]
     quiet = (begins <= longest_lag(n)) & ~stand_out_of(left, early)
     if group.fit.member.intersample == "bandlimited":
-        away = at - delay[:, None]
         reach = ringing_of(group.fit.member.source)
-        ringing = (np.abs(away) <= reach) | (away >= n - 1 - reach)
-        quiet &= ~stand_out_of(left, ringing)
+        quiet &= ~stand_out_of(left, ringing(n, delay[:, None], reach))
     free = _free_responses(np.exp(group.fit.theta[which, 1:]), n)
     since = at - begins[:, None]
     there = (since >= 0) & (since < free.shape[2])
@@ -150,16 +156,9 @@ def _from_rest(fleet: Fleet, group: Group, part: Places, rows: Real, lags: Place
     every = np.concatenate([rows * ~early[:, None], free], axis=1)
     gram = every @ every.transpose(0, 2, 1)
     slope = (every @ left[:, :, None])[:, :, 0]
-    scale = np.sqrt(np.maximum(np.einsum("iaa->ia", gram), np.finfo(float).tiny))
-    gram /= scale[:, :, None] * scale[:, None, :]
-    slope /= scale
-    inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
-    gained = np.einsum("ia,iab,ib->i", slope, inverse, slope)
+    gained, _ = explained(gram, slope, least=_DETERMINED)
     power = np.sum((left * ~early) ** 2, axis=1)
-    count = n - begins
-    rest = np.maximum(power - gained, np.finfo(float).tiny)
-    statistic = count * np.log(np.maximum(power, np.finfo(float).tiny) / rest)
-    return np.asarray(quiet & (statistic <= scipy.special.chdtri(2, FALSE_ALARM)))
+    return np.asarray(quiet & ~needs_free(power, power - gained, n - begins, free.shape[1]))
 
 
 def _free_responses(modes: Real, samples: int) -> Real:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.trial import schwarz
 from hmpim.identify.fleets.fleet import (
     Column,
     Fleet,
@@ -39,7 +40,13 @@ from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.reading.spanned import spanned
-from hmpim.identify.result import Candidate, Nonlinearity, PairIdentification, Parameters
+from hmpim.identify.result import (
+    Candidate,
+    Nonlinearity,
+    PairIdentification,
+    Parameters,
+    fit_percent,
+)
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
@@ -260,7 +267,6 @@ def _candidates(
 ) -> tuple[Candidate, ...]:
     """All structures that were tried, the likeliest first."""
     fleet, i = whole.fleet, int(group.some[k])
-    n = fleet.u.size
     tried = [
         (fleet.structure, fits.member.intersample, float(fits.cost[i]), fits is group.fit)
         for fits in (group.fit, *(other for other, _ in group.others))
@@ -273,8 +279,8 @@ def _candidates(
         Candidate(
             structure=structure.name,
             intersample=mode,
-            criterion=float(n * np.log(cost / n) + structure.parameters * np.log(n)),
-            fit_percent=float(100.0 * (1.0 - np.sqrt(cost / power))),
+            criterion=schwarz(cost, fleet.u.size, structure.parameters),
+            fit_percent=float(fit_percent(cost, power)),
             chosen=chosen,
         )
         for structure, mode, cost, chosen in tried

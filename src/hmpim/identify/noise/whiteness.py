@@ -14,6 +14,7 @@ __all__ = [
     "is_steady",
     "is_white",
     "ljung_box",
+    "share_of",
     "squares_of",
 ]
 
@@ -153,6 +154,10 @@ def effective_share(residual: Real) -> float:
     if is_white(residual) or lags < 1:
         return 1.0
     r = autocovariance(residual, lags)
-    rho = r[1:] / r[0]
-    rho = rho[np.abs(rho) > DEVIATIONS / np.sqrt(np.count_nonzero(residual))]
-    return float(1.0 / (1.0 + 2.0 * np.sum(rho**2)))
+    return share_of(r[1:] / r[0], int(np.count_nonzero(residual)))
+
+
+def share_of(rho: Real, count: int) -> float:
+    """The same from the correlations, (m,), at lags from 1 on, of so many samples."""
+    clear = rho[np.abs(rho) > DEVIATIONS / np.sqrt(count)]
+    return float(1.0 / (1.0 + 2.0 * np.sum(clear**2)))

@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.derivatives import jacobian, products
-from hmpim.identify.fitting.held_steps import steps_through
+from hmpim.identify.fitting.held_steps import in_whole_samples
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
@@ -94,7 +94,9 @@ def read_parameters(
     fit = joint.best.fit
     structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
-    if _in_whole_samples(joint):  # the middle of the sample in which the delay ends
+    if in_whole_samples(
+        structure, held=joint.best.intersample == "zoh"
+    ):  # the middle of the sample in which the delay ends
         vector[0] = np.ceil(np.round(vector[0], 6)) - 0.5
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
@@ -141,7 +143,8 @@ def read_parameters(
 def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
-    whole = fit.structure.sampled or _in_whole_samples(joint)  # its delay is a number of samples
+    whole = in_whole_samples(fit.structure, held=joint.best.intersample == "zoh")
+    whole = whole or fit.structure.sampled  # its delay is a number of samples
     free = slice(int(whole), None)
     inner = None
     if white and is_steady(residual):
@@ -160,12 +163,6 @@ def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, wh
     elif not fit.structure.order:  # else the ends of the sample are read: `spanned`
         full[0, 0] = 1.0 / 12.0  # uniform over the sample in which the delay ends
     return full
-
-
-def _in_whole_samples(joint: JointFit) -> bool:
-    """Whether only the sample in which a delay ends is known: a held input that steps through."""
-    structure, held = joint.best.fit.structure, joint.best.intersample == "zoh"
-    return held and (structure.name == "static" or steps_through(structure, held=True))
 
 
 def _wandering(cov: Real, residual: Real, counted: int) -> Real:

@@ -196,13 +196,7 @@ def identify_levels(
     ('nonlinear', 0.5)
     """
     given = tuple(records)
-    if len(given) < 2:
-        raise ArgumentError(f"{len(given)} record has nothing to be compared with; give two")
-    if amplitudes is not None and len(amplitudes) != len(given):
-        raise ArgumentError(
-            f"{len(given)} records and {len(amplitudes)} amplitudes do not go together; "
-            "give one amplitude for each"
-        )
+    _check_number(len(given), len(given) if amplitudes is None else len(amplitudes), of="record")
     check_channels(given)
     linear = partial(identify, nonlinear="reported")
     results = [linear(r, intersample=intersample, structures=structures) for r in given]
@@ -301,19 +295,24 @@ def _levels(
     results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
 ) -> list[_Level]:
     """Amplitudes, the smallest first, and the parameters identified there."""
-    if len(results) != len(amplitudes):
-        raise ArgumentError(
-            f"{len(results)} results and {len(amplitudes)} amplitudes do not go together; "
-            "give one amplitude for each"
-        )
-    if len(results) < 2:
-        raise ArgumentError(f"{len(results)} level has nothing to be compared with; give two")
+    _check_number(len(results), len(amplitudes), of="level")
     for amplitude in amplitudes:
         if not (np.isfinite(amplitude) and amplitude > 0):
             raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
     parameters = (r.parameters if isinstance(r, PairIdentification) else r for r in results)
     levels = zip(map(float, amplitudes), parameters, strict=True)
     return sorted(levels, key=lambda level: level[0])
+
+
+def _check_number(count: int, amplitudes: int, *, of: str) -> None:
+    """Refuse numbers of results and amplitudes that do not go together, or a single level."""
+    if count != amplitudes:
+        raise ArgumentError(
+            f"{count} {of}s and {amplitudes} amplitudes do not go together; give one amplitude "
+            "for each"
+        )
+    if count < 2:
+        raise ArgumentError(f"{count} {of} has nothing to be compared with; give two")
 
 
 def _linear_range(levels: list[_Level], reach: float, unit: str) -> str:

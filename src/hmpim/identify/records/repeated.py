@@ -1,7 +1,7 @@
 """Result of several records of one stimulus."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.result import Estimate, FrequencyResponse, Identification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.lookup import find_pair
-from hmpim.identify.result.plain import plain
+from hmpim.identify.result.plain import fields_in
 from hmpim.record import Finding
 from hmpim.tables import html_table, shortened
 
@@ -59,9 +59,8 @@ class RepeatedParameter:
     agree: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain JSON values."""
-        named = (field.name for field in fields(self) if field.name != "name")
-        return {name: plain(getattr(self, name)) for name in named}
+        """Return plain JSON values, without the name."""
+        return {name: value for name, value in fields_in(self).items() if name != "name"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -135,19 +134,11 @@ class RepeatedPair:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; null for what is not finite."""
-        scatter = self.response_scatter
-        return {
-            "input": self.input,
-            "output": self.output,
-            "structures": list(self.structures),
-            "parameters": {p.name: p.to_dict() for p in self.parameters},
-            "frequency_response": self.frequency_response.to_dict(),
-            "response_scatter": scatter if np.isfinite(scatter) else None,
-            "noise_std": None if self.noise_std is None else self.noise_std.to_dict(),
-            "unmodelled": self.unmodelled,
-            "unmodelled_probability": self.unmodelled_probability,
-            "warnings": [f.to_dict() for f in self.findings],
-        }
+        own, scatter = fields_in(self), self.response_scatter
+        own["parameters"] = {p.name: p.to_dict() for p in self.parameters}
+        own["response_scatter"] = scatter if np.isfinite(scatter) else None
+        own["warnings"] = own.pop("findings")
+        return own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -187,8 +178,4 @@ class Repeats:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all of it as plain JSON values, `schema` first."""
-        return {
-            "schema": SCHEMA,
-            "results": [result.to_dict() for result in self.results],
-            "pairs": [pair.to_dict() for pair in self.pairs],
-        }
+        return {"schema": SCHEMA, **fields_in(self)}

@@ -24,7 +24,7 @@ from hmpim.identify.result.measured import (
     Nonlinearity,
     ResponseBandwidths,
 )
-from hmpim.identify.result.pair import Candidate, PairIdentification
+from hmpim.identify.result.pair import Candidate, PairIdentification, fit_percent
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
 
 __all__ = [
@@ -45,4 +45,5 @@ __all__ = [
     "RecordSummary",
     "ResponseBandwidths",
     "Verdict",
+    "fit_percent",
 ]

@@ -11,7 +11,7 @@ from hmpim.identify.result.first_schema import FIRST_SCHEMA, upgraded
 from hmpim.identify.result.inputs import InputSet
 from hmpim.identify.result.lookup import find_pair
 from hmpim.identify.result.pair import PairIdentification, pair_rows
-from hmpim.identify.result.plain import Plain, by_fields, plain
+from hmpim.identify.result.plain import Plain, by_fields, fields_in
 from hmpim.record import Record
 from hmpim.tables import html_table, shortened
 
@@ -104,12 +104,7 @@ class Identification(ByValue):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain JSON values, `schema` first."""
-        return {
-            "schema": SCHEMA,
-            "record": plain(self.record),
-            "pairs": plain(self.pairs),
-            "inputs": plain(self.inputs),
-        }
+        return {"schema": SCHEMA, **fields_in(self)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Identification":

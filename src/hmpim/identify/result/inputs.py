@@ -8,7 +8,7 @@ import numpy as np
 
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.result.plain import Plain, by_fields
+from hmpim.identify.result.plain import Plain, by_fields, fields_in
 from hmpim.identify.worth import MATERIAL
 
 __all__ = ["Alike", "InputSet", "OutputCoherence"]
@@ -104,7 +104,7 @@ class InputSet(ByValue, Plain):
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values; an infinite condition is null."""
         condition = [c if np.isfinite(c) else None for c in self.condition.tolist()]
-        return {**Plain.to_dict(self), "condition": condition}
+        return {**fields_in(self), "condition": condition}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "InputSet":

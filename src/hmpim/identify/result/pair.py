@@ -4,25 +4,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, overload
 
+import numpy as np
+
 from hmpim.equality import ByValue
 from hmpim.identify.arrays import Real
 from hmpim.identify.result.digits import interval
 from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
-from hmpim.identify.result.plain import Plain, by_fields, plain
+from hmpim.identify.result.plain import Plain, by_fields, fields_in
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
-__all__ = ["Candidate", "PairIdentification", "pair_rows"]
+__all__ = ["Candidate", "PairIdentification", "fit_percent", "pair_rows"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate(Plain):
     """One structure that was tried: how well it fits, and its criterion.
 
-    `criterion` is the Bayesian information criterion, lower is better; `fit_percent` is
-    100 (1 - ||y - ŷ|| / ||y - mean y||).
+    `criterion` is the Bayesian information criterion, lower is better; for `fit_percent` see the
+    function of that name.
     """
 
     structure: str
@@ -30,6 +32,19 @@ class Candidate(Plain):
     criterion: float
     fit_percent: float
     chosen: bool = False
+
+
+def fit_percent(left: Real | float, spread: Real | float) -> Real:
+    """Return 100 (1 - ||y - ŷ|| / ||y - mean y||) from both sums of squares; 0 for a constant y.
+
+    Examples
+    --------
+    >>> float(fit_percent(0.01, 1.0)), float(fit_percent(1.0, 0.0))
+    (90.0, 0.0)
+    """
+    shape = np.broadcast_shapes(np.shape(left), np.shape(spread))
+    share = np.divide(left, spread, out=np.ones(shape), where=np.greater(spread, 0.0))
+    return np.asarray(100.0 * (1.0 - np.sqrt(share)))
 
 
 class _Figure:
@@ -104,27 +119,10 @@ class PairIdentification(ByValue, Plain):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the pair as plain JSON values, an entry of `Identification.to_dict`."""
-        return {
-            "input": self.input,
-            "output": self.output,
-            "structure": self.structure,
-            "intersample": self.intersample,
-            "fit_percent": self.fit_percent,
-            "parameters": plain(self.parameters),
-            "paper": plain(self.paper),
-            "frequency_response": plain(self.frequency_response),
-            "bandwidths_from_response": plain(self.from_response),
-            "dynamics": {
-                "numerator": plain(self.numerator),
-                "denominator": plain(self.denominator),
-                "covariance": plain(self.covariance),
-            },
-            "candidates": plain(self.candidates),
-            "nonlinearity": plain(self.nonlinearity),
-            "verdict": self.verdict,
-            "warnings": plain(self.warnings),
-            "stopping": plain(self.stopping),
-        }
+        own = fields_in(self)
+        dynamics = {name: own.pop(name) for name in ("numerator", "denominator", "covariance")}
+        response = own.pop("from_response")
+        return {**own, "bandwidths_from_response": response, "dynamics": dynamics}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "PairIdentification":

@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-__all__ = ["Plain", "by_fields", "plain", "restored"]
+__all__ = ["Plain", "by_fields", "fields_in", "plain", "restored"]
 
 T = TypeVar("T")
 
@@ -22,9 +22,8 @@ class Plain:
     __slots__ = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the value as plain JSON values."""
-        own: Any = self
-        return {field.name: plain(getattr(self, field.name)) for field in fields(own)}
+        """Return the value as plain JSON values, without fields that are not compared."""
+        return fields_in(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -46,6 +45,11 @@ def by_fields(cls: type[T], data: Mapping[str, Any]) -> T:
     return cls(**made)
 
 
+def fields_in(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass by name as plain JSON values, if they are compared."""
+    return {f.name: plain(getattr(value, f.name)) for f in fields(value) if f.compare}
+
+
 def plain(value: Any) -> Any:
     """Return a dataclass by its fields, arrays and tuples as lists, and all else as it is.
 
@@ -57,7 +61,7 @@ def plain(value: Any) -> Any:
     if hasattr(value, "to_dict"):
         return value.to_dict()
     if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return fields_in(value)
     if isinstance(value, np.ndarray):
         return value.tolist()
     return [plain(one) for one in value] if isinstance(value, tuple) else value

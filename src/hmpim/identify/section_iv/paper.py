@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from hmpim.arguments import checked
@@ -22,14 +21,14 @@ from hmpim.identify.section_iv.correlation import (
     likeness,
 )
 from hmpim.identify.section_iv.spectrum import (
+    Spectrum,
     decibel,
     excited_band,
-    padding,
     ratio,
     spectrum,
     well_excited,
 )
-from hmpim.identify.section_iv.windows import WindowName, window_samples
+from hmpim.identify.section_iv.windows import WindowName
 from hmpim.identify.signals import as_pair, bins_in, check_band, check_rate, longest_lag
 
 __all__ = ["PaperAnalysis", "estimates_of_many", "paper_analysis", "paper_estimates"]
@@ -51,8 +50,8 @@ class PaperAnalysis:
         True if the cross-correlation peaks below zero: the device inverts the sign.
     lag, cross_correlation : ndarray, shape (2n-1,)
         Lags in s, positive for a late output, and equation (8) (Fig. 8).
-    error_time, error : ndarray, shape (e,)
-        Time in s of the stimulus, and the time-corrected error of equation (9).
+    error : ndarray, shape (e,)
+        Time-corrected error of equation (9), by samples of the stimulus.
     error_lag, error_autocorrelation : ndarray, shape (2e-1,)
         Lags in s, and equation (10) (Figs 9 and 11).
     frequency : ndarray, shape (m,)
@@ -78,7 +77,6 @@ class PaperAnalysis:
     inverted: bool
     lag: Real
     cross_correlation: Real
-    error_time: Real
     error: Real
     error_lag: Real
     error_autocorrelation: Real
@@ -189,7 +187,6 @@ def paper_analysis(
         inverted=peak.value < 0,
         lag=correlation.lag / fs,
         cross_correlation=correlation.value,
-        error_time=np.arange(error.size) / fs,
         error=error,
         error_lag=inner.lag / fs,
         error_autocorrelation=inner.value,
@@ -241,38 +238,28 @@ def estimates_of_many(
     >>> [own.delay for own in estimates_of_many(u, late, 200.0, (0.1, 20.0))]
     [0.15, 0.1, None]
     """
-    n = u.size
-    length = n + padding(n)
     found = [PaperEstimates()] * len(outputs)
     moving = [i for i, y in enumerate(outputs) if np.ptp(y) > 0]
     if not moving:
         return found
-    peaks = [likeness(u, outputs[i], longest_lag(n)).peak for i in moving]
-    bins, taper = int(band[1] * length / fs) + 2, _taper(n)
-    below = _tapered_input(u, taper, length, bins)
-    above = np.stack([_tapered(outputs[i], taper, length, bins) for i in moving])
-    frequency = np.asarray(np.arange(bins) * (fs / length), dtype=np.float64)
-    inside = _frequency_steps(below, above, frequency, band, peaks)
+    peaks = [likeness(u, outputs[i], longest_lag(u.size)).peak for i in moving]
+    below = _input_spectrum(u, fs, band[1])
+    above = np.stack([_spectrum(outputs[i], fs, band[1]).value for i in moving])
+    inside = _frequency_steps(below.value, above, below.frequency, band, peaks)
     for k, (i, peak) in enumerate(zip(moving, peaks, strict=True)):
         estimates, _ = _time_steps(u, outputs[i], peak, fs)
         found[i] = _with_band(estimates, inside, k)
     return found
 
 
-@kept
-def _taper(samples: int) -> Real:
-    return window_samples("gaussian", samples)
+def _spectrum(x: Real, fs: float, highest: float) -> Spectrum:
+    """Spectrum of a signal less its mean, with the paper's window, a little beyond a frequency."""
+    whole = spectrum(x - x.mean(), fs)
+    bins = int(np.searchsorted(whole.frequency, highest)) + 2
+    return Spectrum(frequency=whole.frequency[:bins], value=whole.value[:bins].copy())
 
 
-def _tapered(x: Real, taper: Real, length: int, bins: int) -> Complex:
-    """First bins of the padded transform of a signal less its mean, windowed as in the paper."""
-    padded = np.zeros(length)
-    np.subtract(x, x.mean(), out=padded[: x.size])
-    padded[: x.size] *= taper
-    return np.array(scipy.fft.rfft(padded)[:bins], dtype=np.complex128)
-
-
-_tapered_input = kept(_tapered)
+_input_spectrum = kept(_spectrum)
 """The same of a stimulus, kept since all its outputs need it."""
 
 

@@ -7,6 +7,7 @@ import scipy
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
+from hmpim.identify.kept import kept
 
 __all__ = ["WindowName", "window_samples"]
 
@@ -30,6 +31,7 @@ WindowName = Literal[
 _NARROWEST = 1e100  # its square is still finite
 
 
+@kept
 def window_samples(name: WindowName, samples: int, *, alpha: float = 1.5) -> Real:
     """Return a window by its name, symmetric.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.least_squares import added, explained, solved
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.noise.misfit import Misfit
@@ -73,20 +73,16 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     count, weights = fitted.weights.size, fitted.weights
     cross = third.cross - mixed[:, :count] @ weights
     residual = first.cross - first.gram[:, :count] @ weights
-    shift = -solved(first.gram, mixed.T)
-    gain, left = cross + shift.T @ residual, third.gram + mixed @ shift
+    _, left, gain = added(first.gram, mixed, third.gram, residual, cross)
     cost = first.energy - float(weights @ (first.cross[:count] + residual[:count]))
     cost -= float(residual @ solved(first.gram, residual))
-    size = np.sqrt(np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0))
-    left = left / np.outer(size, size)
-    almost_binary = float(np.mean(np.diag(left))) < MUCH  # its edges lie between the samples
-    values, vectors = np.linalg.eigh(left)
-    kept = values > _SEEN
-    freedom = int(kept.sum())
-    if almost_binary or not freedom or cost <= 0.0:
+    size = np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0)
+    almost_binary = float(np.mean(np.diag(left) / size)) < MUCH  # its edges are between the samples
+    power, determined = explained(left, gain, least=_SEEN, size=size)
+    if almost_binary or not determined or cost <= 0.0:
         return Misfit(share=0.0, probability=1.0)
-    explained = (vectors.T @ (gain / size))[kept] ** 2 / values[kept]
-    return explained_by(explained, cost, products.counted - linear.rows.shape[0] - freedom)
+    freedom = products.counted - linear.rows.shape[0] - int(determined)
+    return explained_by(float(power), int(determined), cost, freedom)
 
 
 def _ending(rows: Real) -> Responses:

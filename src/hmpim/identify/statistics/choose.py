@@ -24,7 +24,7 @@ from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.start import RoughResponse
-from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.fitting.trial import JointFit, schwarz
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.beyond import beyond_of, has_cubes
 from hmpim.identify.statistics.fit import Compressed, Fitted, as_fitted, pulse
@@ -211,7 +211,7 @@ def _criterion(fit: Fitted, count: int) -> float:
     # Where sums cancel, rounding may make the power negative.
     least = np.finfo(float).eps * fit.products.plain.energy / count
     parameters = fit.structure.parameters + left.noise.size - 1
-    return float(count * np.log(max(left.innovation, least)) + parameters * np.log(count))
+    return schwarz(count * max(left.innovation, least), count, parameters)
 
 
 def _is_conditioned(statistics: Statistics) -> bool:

@@ -5,6 +5,7 @@ import hashlib
 import numpy as np
 
 from hmpim.errors import RecordError
+from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
@@ -22,13 +23,13 @@ from hmpim.identify.judgement.reach import (
 from hmpim.identify.judgement.residual import lack_of_fit
 from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import unfollowed
+from hmpim.identify.reading.candidates import candidates_of
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned, without_noise
 from hmpim.identify.result import (
-    Candidate,
     FrequencyResponse,
     Identification,
     PairIdentification,
@@ -36,6 +37,7 @@ from hmpim.identify.result import (
     Parameters,
     RecordSummary,
     ResponseBandwidths,
+    fit_percent,
 )
 from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.statistics.beyond import has_cubes, nonlinear_findings
@@ -186,6 +188,13 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
     band = (data.band[0] * fs, data.band[1] * fs)
     readings = _read(statistics, joint, min(band[1], fs / 2))
     system, spread = readings.system, readings.coefficient_covariance
+    total = _spread(statistics)
+
+    def percent(fit: Fit) -> float:
+        """Where the noise is coloured, that of the whitened output."""
+        power = best.left.power * fit.objective / max(best.objective, 1e-300)
+        return float(fit_percent(power * statistics.samples, total))
+
     evidence = Evidence(
         joint=joint,
         readings=readings,
@@ -194,7 +203,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         u=np.empty(0),
         fs=fs,
         band=band,
-        fit_percent=_fit_percent(statistics, best.left.power),
+        fit_percent=percent(best),
         measured=ResponseBandwidths(),
     )
     findings, parameters = judge(evidence, checks=_CHECKS), readings.parameters
@@ -223,7 +232,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         ),
         numerator=numerator,
         denominator=denominator,
-        candidates=_candidates(statistics, joint),
+        candidates=candidates_of(joint, percent),
         warnings=(*findings, _no_samples(statistics)),
         covariance=highest_first(spread, system),
     )
@@ -246,29 +255,13 @@ def _check_window(statistics: Statistics, fit: Fitted) -> None:
     )
 
 
-def _fit_percent(statistics: Statistics, power: float) -> float:
+def _spread(statistics: Statistics) -> float:
+    """Sum of squares of the outputs, each run's about its mean."""
     spread = 0.0
     for run in statistics.runs:
         total = float(run.vv[: statistics.reach.rows, -1, 0].sum())
         spread += float(run.vv[-1, -1, 0]) - total**2 / run.samples
-    return float(100.0 * (1.0 - np.sqrt(power * statistics.samples / spread)))
-
-
-def _candidates(statistics: Statistics, joint: JointFit) -> tuple[Candidate, ...]:
-    """All trials, the likeliest first; where the noise is coloured, of the whitened output."""
-    best = as_fitted(joint.best.fit)
-    return tuple(
-        Candidate(
-            structure=trial.fit.structure.name,
-            intersample=trial.intersample,
-            criterion=trial.criterion,
-            fit_percent=_fit_percent(
-                statistics, best.left.power * trial.fit.objective / max(best.objective, 1e-300)
-            ),
-            chosen=trial.fit is best,
-        )
-        for trial in sorted(joint.trials, key=lambda trial: trial.criterion)
-    )
+    return spread
 
 
 def _no_samples(statistics: Statistics) -> Finding:

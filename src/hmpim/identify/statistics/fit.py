@@ -13,13 +13,14 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.climb import climb
 from hmpim.identify.fitting.fit import Fit, bounded_for, evaluating
-from hmpim.identify.fitting.held_steps import steps_through
+from hmpim.identify.fitting.held_steps import in_whole_samples
 from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.noise.autoregression import whitening_filter
+from hmpim.identify.noise.whiteness import share_of
 from hmpim.identify.statistics.products import Moments, Products, Remainder, Responses
 from hmpim.identify.statistics.reach import AHEAD, Reach
 from hmpim.model.dynamics import Structure
@@ -244,13 +245,12 @@ class Fitted(Fit):
     def covariance(self) -> Real:
         """Covariance of theta, the numerator and the mean bias: the Cramér-Rao bound."""
         gram = self.moments.gram
-        static, held = self.structure.name == "static", self.problem.source.degree == 0
-        if (static and held) or steps_through(self.structure, held=held):
-            # The delay moves in whole samples only. In a static model it is uniform over the sample
-            # in which it ends; otherwise figures are read at both ends of that sample.
+        if in_whole_samples(self.structure, held=self.problem.source.degree == 0):
+            # In a static model the delay is uniform over the sample in which it ends; otherwise
+            # figures are read at both ends of that sample.
             inverse = np.zeros_like(gram)
             inverse[1:, 1:] = inverted(gram[1:, 1:])
-            inverse[0, 0] = 1.0 / (12.0 * self.variance) if static else 0.0
+            inverse[0, 0] = 0.0 if self.structure.order else 1.0 / (12.0 * self.variance)
         else:
             inverse = inverted(gram)
         slope = self.moments.bias_rows
@@ -279,7 +279,6 @@ class Fitted(Fit):
         lags = np.arange(1, rho.size + 1)
         box = count * (count + 2.0) * float(np.sum(rho**2 / (count - lags)))
         white = rho.size == 0 or scipy.special.chdtrc(rho.size, box) > FALSE_ALARM
-        clear = rho[np.abs(rho) > DEVIATIONS / np.sqrt(count)]
         noise = np.ones(1) if white else whitening_filter(gram, count)
         if white and not products.order:
             power, count = self.objective, products.counted
@@ -287,7 +286,7 @@ class Fitted(Fit):
             power=power / count,
             counted=count,
             innovation=float(noise @ gram[: noise.size, : noise.size] @ noise) / count,
-            share=1.0 if white else float(1.0 / (1.0 + 2.0 * np.sum(clear**2))),
+            share=1.0 if white else share_of(rho, count),
             noise=noise,
         )
 

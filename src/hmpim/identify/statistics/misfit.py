@@ -12,7 +12,7 @@ import scipy
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.growth import HiddenPole, response_to_square
-from hmpim.identify.fitting.least_squares import UNSEEN, solved
+from hmpim.identify.fitting.least_squares import UNSEEN, added, explained
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products, Responses
@@ -65,23 +65,20 @@ def misfit_of(
     band is in cycles per sample.
     """
     gain, left, cost, *_ = _in_addition(fitted, products, probes.rows, probes.transforms)
-    power_left = np.diag(left)
-    size = np.sqrt(np.where(power_left > 1e-200 * power_left.max(), power_left, 1.0))
-    values, vectors = np.linalg.eigh(left / np.outer(size, size))
-    kept = values > _SEEN * values[-1]
-    explained = (vectors.T @ (gain / size))[kept] ** 2 / values[kept]
-    return explained_by(explained, cost, products.counted - fitted.weights.size - 1)
+    power, count = explained(left, gain, least=_SEEN)
+    freedom = products.counted - fitted.weights.size - 1
+    return explained_by(float(power), int(count), cost, freedom)
 
 
-def explained_by(explained: Real, cost: float, freedom: int) -> Misfit:
-    """Compare the power that each of several directions explains, (k,), with the noise's.
+def explained_by(power: float, count: int, cost: float, freedom: int) -> Misfit:
+    """Compare the power that so many directions explain with the noise's.
 
     `cost` is the sum of squares of the residual, and `freedom` its degrees of freedom.
     """
-    variance, power = cost / max(freedom, 1), float(np.sum(explained))
+    variance = cost / max(freedom, 1)
     return Misfit(
-        share=max((power - explained.size * variance) / cost, 0.0),
-        probability=float(scipy.special.chdtrc(explained.size, power / variance)),
+        share=max((power - count * variance) / cost, 0.0),
+        probability=float(scipy.special.chdtrc(count, power / variance)),
     )
 
 
@@ -114,11 +111,15 @@ def _in_addition(
     count = rows.shape[0]
     both = Responses.ending(rows, rows.sum(axis=1)).and_also(fitted.responses)
     moments = products.moments(both, known=known)
-    linear, mixed = fitted.weights, moments.gram[:count, count:]
-    shift = -solved(moments.gram[count:, count:], mixed.T)
-    left = moments.gram[:count, :count] + mixed @ shift
-    residual = moments.cross - moments.gram[:, count:] @ linear
-    gain = residual[:count] + shift.T @ residual[count:]
+    gram, linear = moments.gram, fitted.weights
+    residual = moments.cross - gram[:, count:] @ linear
+    shift, left, gain = added(
+        gram[count:, count:],
+        gram[:count, count:],
+        gram[:count, :count],
+        residual[count:],
+        residual[:count],
+    )
     cost = moments.energy - linear @ (moments.cross[count:] + residual[count:])
     least = float(np.finfo(float).eps * moments.energy)
-    return gain, left, max(float(cost), least), shift, np.diag(moments.gram)[:count]
+    return gain, left, max(float(cost), least), shift, np.diag(gram)[:count]

@@ -21,9 +21,6 @@ from hmpim.identify.statistics.statistics import Statistics
 
 __all__ = ["Moments", "Products", "Remainder", "Responses", "spectrum_of"]
 
-_FEW = 64
-"""Samples at the beginning up to which a convolution is faster as a product with a matrix."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
@@ -133,11 +130,6 @@ class Products:
             slice(reach.span, reach.span + reach.taps + self.order),
         )
         """Samples of a full convolution with the head that do not count; with the tail."""
-        self._begun: Real | None = None
-        """Matrices that turn the first samples of a response into those of a convolution."""
-        if self._apart[0].stop <= min(_FEW, reach.taps):
-            heads = [run.head_u[: self.first + AHEAD] for run in runs]
-            self._begun = np.stack([scipy.linalg.toeplitz(u, 0.0 * u).T for u in heads])
         parts = [self._around[i::2, :, apart] for i, apart in enumerate(self._apart)]
         self._out = np.concatenate(parts, axis=2)
         self._inner = np.stack([self._outputs(run) for run in runs])
@@ -245,7 +237,7 @@ class Products:
             spectra = self.transform(rows)
         else:
             spectra = np.vstack([known, self.transform(rows[known.shape[0] :])])
-        apart = self._not_counted(rows, spectra)
+        apart = self._not_counted(spectra)
         flat = apart.reshape(rows.shape[0], -1)
         gram = _products(spectra, self._power, self._length) - flat @ flat.T
         lost = apart.transpose(1, 0, 2) @ self._out.transpose(0, 2, 1)
@@ -271,26 +263,20 @@ class Products:
         around = np.zeros(self._length)
         around[: span + 1], around[self._length - span :] = lags[span:], lags[:span]
         whole = _products(ours, scipy.fft.rfft(around), self._length, theirs)
-        apart = self._not_counted(responses.rows, ours)
-        beyond = other._not_counted(others.rows, theirs)
+        apart = self._not_counted(ours)
+        beyond = other._not_counted(theirs)
         flat = apart.reshape(len(ours), -1) @ beyond.reshape(len(theirs), -1).T
         first, second = self.moments(responses).fixed_rows, other.moments(others).fixed_rows
         inner = self._unsummed[:, :-1, :-1]
         return np.asarray(whole - flat - np.sum(first.transpose(0, 2, 1) @ inner @ second, axis=0))
 
-    def _not_counted(self, rows: Real, spectra: Complex) -> Real:
+    def _not_counted(self, spectra: Complex) -> Real:
         """Samples at the ends of each run that do not count, (q, runs, samples)."""
-        head, tail = self._apart
-        heads, tails = self._inputs[0::2], self._inputs[1::2]
-        late = scipy.fft.irfft(spectra[:, None] * tails, self._length)[..., tail]
-        if self._begun is None:
-            early = scipy.fft.irfft(spectra[:, None] * heads, self._length)[..., head]
-        else:
-            first = rows[:, head]
-            if self.order:
-                first = scipy.signal.lfilter(self.noise, np.ones(1), first)
-            early = (first @ self._begun).transpose(1, 0, 2)
-        return np.concatenate([early, late], axis=2)
+        parts = [
+            scipy.fft.irfft(spectra[:, None] * self._inputs[i::2], self._length)[..., apart]
+            for i, apart in enumerate(self._apart)
+        ]
+        return np.concatenate(parts, axis=2)
 
     def left_over(self, response: Real, kept: float, bias: Real) -> Remainder:
         """Return the residual of a model; for products without a noise model only.

@@ -17,17 +17,6 @@ AHEAD = 32
 class Reach:
     """Lags kept, and knots of the bias.
 
-    Parameters
-    ----------
-    lags : int
-        Longest lag of an impulse response, delay included, in samples.
-    knots : tuple of int
-        Samples of a run at which its bias has a value of its own, linear between them and constant
-        outside; one knot is a constant bias.
-    beyond : bool
-        Whether products of the input's cube and the output's standstills are kept too: they reveal
-        nonlinearity and held outputs.
-
     Examples
     --------
     >>> reach = Reach(lags=100)
@@ -35,8 +24,12 @@ class Reach:
     (133, 162)
     """
 
-    lags: int
+    lags: int  # longest lag of an impulse response, delay included, in samples
+    # samples of a run at which its bias has a value of its own, linear between them and constant
+    # outside; one knot is a constant bias
     knots: tuple[int, ...] = (0,)
+    # whether products of the input's cube and the output's standstills are kept too, which reveal
+    # nonlinearity and held outputs
     beyond: bool = True
 
     @property

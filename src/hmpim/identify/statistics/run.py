@@ -48,52 +48,25 @@ class Run(ByValue):
     Outputs are the rows of the bias, the running sum of the input, and the measured output. Input
     and measured output are deviations from their first samples; the sum is not, since an integrator
     turns a constant input into a ramp.
-
-    Parameters
-    ----------
-    samples : int
-        How many have been read.
-    level : ndarray, shape (2,)
-        First samples of input and output.
-    uu : ndarray, shape (span + 1,)
-        Σ u(t) u(t-k).
-    vu : ndarray, shape (rows + 2, forth + back + 1)
-        Σ v(t) u(t-k), k from -forth on.
-    vv : ndarray, shape (rows + 2, rows + 2, LONGEST + 1)
-        Σ v_i(t) v_j(t-k).
-    head_u, tail_u : ndarray, shape (span,)
-        First and last samples of the input; 0 where there are none.
-    head_y : ndarray, shape (back,)
-        First samples of the output.
-    tail_y : ndarray, shape (forth,)
-        Its last ones.
-    scale : ndarray, shape (1,)
-        Divisor of the input before it is cubed: a power of two, so that a change of it is exact.
-        This and all that follows is empty where no cubes are kept.
-    ww : ndarray, shape (span + 1,)
-        Σ w(t) w(t-k), w the cube.
-    wu : ndarray, shape (2 span + 1,)
-        Σ w(t) u(t-k), k from -span on.
-    vw : ndarray, shape (rows + 1, forth + back + 1)
-        Σ v(t) w(t-k), without the running sum.
-    stood : ndarray, shape (STOOD + 1,)
-        Samples since the output last changed, then how often it kept a value for 1, 2, … samples;
-        the last entry also counts longer standstills.
     """
 
-    samples: int
-    level: Real
-    uu: Real
-    vu: Real
-    vv: Real
-    head_u: Real
-    tail_u: Real
-    head_y: Real
-    tail_y: Real
+    samples: int  # read so far
+    level: Real  # (2,): first samples of input and output
+    uu: Real  # (span + 1,): Σ u(t) u(t-k)
+    vu: Real  # (rows + 2, forth + back + 1): Σ v(t) u(t-k), k from -forth on
+    vv: Real  # (rows + 2, rows + 2, LONGEST + 1): Σ v_i(t) v_j(t-k)
+    head_u: Real  # (span,): first samples of the input; 0 where there are none
+    tail_u: Real  # (span,): its last ones
+    head_y: Real  # (back,): first samples of the output
+    tail_y: Real  # (forth,): its last ones
+    # (1,): divisor of the input before it is cubed, a power of two, so that a change of it is
+    # exact; this and all that follows is empty where no cubes are kept
     scale: Real
-    ww: Real
-    wu: Real
-    vw: Real
+    ww: Real  # (span + 1,): Σ w(t) w(t-k), w the cube
+    wu: Real  # (2 span + 1,): Σ w(t) u(t-k), k from -span on
+    vw: Real  # (rows + 1, forth + back + 1): Σ v(t) w(t-k), without the running sum
+    # (STOOD + 1,): samples since the output last changed, then how often it kept a value for 1, 2,
+    # … samples; the last entry also counts longer standstills
     stood: Real
 
     @property

@@ -55,9 +55,8 @@ def _without(total: float, samples: Real) -> Real:
     return np.asarray(total - np.concatenate([[0.0], np.cumsum(samples)]))
 
 
-def _power_of(statistics: Statistics, length: int) -> Real:
-    """Power spectrum of the input at length // 2 + 1 frequencies, smoothed by its lag window."""
-    uu, _ = correlations(statistics)
+def _power_of(uu: Real, length: int) -> Real:
+    """Power spectrum of an autocorrelation at length // 2 + 1 frequencies, smoothed by a window."""
     windowed = uu * scipy.signal.windows.blackman(2 * uu.size - 1)[uu.size - 1 :]
     return np.asarray(np.maximum(spectrum_of(windowed, length), 0.0))
 
@@ -67,7 +66,7 @@ def excited(statistics: Statistics) -> tuple[float, float]:
     if statistics.band is not None:
         return statistics.band
     length = scipy.fft.next_fast_len(4 * statistics.reach.span, real=True)
-    level = np.sqrt(_power_of(statistics, length))
+    level = np.sqrt(_power_of(correlations(statistics)[0], length))
     level[0] = 0.0
     return band_of_levels(level, statistics.fs / length)
 
@@ -95,7 +94,7 @@ def rough_of(
     if known is not None:
         made = scipy.fft.irfft(scipy.fft.rfft(known, length) * spectrum, length)
         cross = cross - made[: cross.size]
-    power = _power_of(statistics, length)
+    power = _power_of(uu, length)
     ridge = _RIDGE * float(power.max())
     answer = _solved(spectrum, ridge, cross, length)
     moved = scipy.fft.rfft(answer, length) * np.exp(

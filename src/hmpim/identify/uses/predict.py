@@ -9,7 +9,7 @@ from hmpim.arguments import checked
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import FORGETS
-from hmpim.identify.result import Estimate, PairIdentification
+from hmpim.identify.result import Estimate, PairIdentification, fit_percent
 from hmpim.identify.result.groups import in_words
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
 from hmpim.record import Record, uniform
@@ -109,9 +109,9 @@ def _why(pair: PairIdentification) -> str:
 
 
 def fit_percent_of(y: Real, residual: Real) -> float:
-    """100 (1 - ‖residual‖ / ‖y - mean y‖) over the samples that count, (n,); 0 for a constant."""
-    spread = float(np.linalg.norm(y - y.mean()))
-    return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else 0.0
+    """Fit in per cent over the samples that count, (n,)."""
+    away = y - y.mean()
+    return float(fit_percent(float(residual @ residual), float(away @ away)))
 
 
 def rate_of(pair: PairIdentification) -> float | None:
