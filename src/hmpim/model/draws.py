@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.arguments import checked, generator
+from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
-from hmpim.model.model import Model, frequency_response
+from hmpim.model.model import Model
+from hmpim.model.response import by_falling_powers, response_std
 
 __all__ = ["coefficient_vector", "draw_models", "response_error"]
 
@@ -60,22 +61,8 @@ def response_error(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.f
     """
     if model.spread is None:
         return np.full(np.shape(frequency), np.nan)
-    s = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
-    system = model.system
-    above, below = system.numerator, system.denominator
-    first = 2 if model.denominator[-1] == 0.0 else 1
-    powers = s[None, :] ** np.arange(max(above.size, below.size))[:, None]
-    slopes = np.concatenate(  # of ln G, in the order of `coefficient_vector`
-        [
-            -s[None, :],
-            (powers[: above.size] / (above @ powers[: above.size]))[::-1],
-            (-powers[first : below.size] / (below @ powers[: below.size]))[::-1],
-        ]
-    )
-    covariance = np.array(model.spread.covariance)
-    variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
-    size = np.abs(frequency_response(model, np.asarray(frequency, dtype=np.float64)))
-    return np.asarray(size * np.sqrt(np.maximum(variance, 0.0)))
+    covariance = by_falling_powers(np.array(model.spread.covariance), model.system.numerator.size)
+    return response_std(model.system, covariance, numbers_of("frequency", frequency))
 
 
 @checked

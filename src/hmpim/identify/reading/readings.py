@@ -14,8 +14,7 @@ from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
 from hmpim.identify.noise.level import steadiness
 from hmpim.identify.noise.whiteness import is_steady, is_white
-from hmpim.identify.reading.figures import read_figures
-from hmpim.identify.reading.propagation import gradient
+from hmpim.identify.reading.figures import gradient, read_figures
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.model.response import RationalDelay

@@ -24,7 +24,6 @@ from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
-from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned, without_noise
 from hmpim.identify.result import (
@@ -46,7 +45,7 @@ from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.model.dynamics import StructureName
-from hmpim.model.response import response, slowest_time_constant
+from hmpim.model.response import response, response_std, slowest_time_constant
 from hmpim.record import Finding, Intersample
 
 __all__ = ["identify_statistics"]
