@@ -47,8 +47,6 @@ class Readings:
         record, from `hmpim.identify.fitting.fit.products`.
     innovations : ndarray, shape (n,)
         The residual, whitened.
-    whitened : bool
-        Whether `innovations` are white.
     coefficient_covariance : ndarray, shape (q, q)
         Of the delay and the coefficients of `system` that may vary, by rising powers of s.
     """
@@ -60,7 +58,6 @@ class Readings:
     white: bool
     halves: Real
     innovations: Real
-    whitened: bool
     coefficient_covariance: Real
 
     def variance(self, function: Callable[[Real], float]) -> float:
@@ -132,7 +129,6 @@ def read_parameters(
         white=white and not weighed.is_coloured,
         halves=halves,
         innovations=residual,
-        whitened=white,
         coefficient_covariance=coefficients,
     )
 

@@ -174,7 +174,6 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
         white=best.is_white,
         halves=np.zeros((2, 0, 0)),
         innovations=np.empty(0),
-        whitened=True,
         coefficient_covariance=spread,
     )
 
