@@ -304,7 +304,13 @@ def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) ->
                 variance * best.moments.bias_variance,
                 freedom=products.counted - 1,
                 unit=statistics.units[1],
-            )
+            ),
+            noise_std=noise_estimate(
+                products.plain.energy,
+                freedom=max(products.plain.counted - 1, 1),
+                share=1.0,
+                unit=statistics.units[1],
+            ),
         ),
         paper=PaperEstimates(),
         frequency_response=FrequencyResponse(
