@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median"]
+__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median", "thinned"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,6 +48,11 @@ def averaged(values: Real, reach: int | NDArray[np.int64]) -> Real:
     total = np.zeros((*values.shape[:-1], count + 1))
     np.cumsum(values, axis=-1, out=total[..., 1:])
     return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / (end - begin))
+
+
+def thinned(x: Real, block: int) -> Real:
+    """Means over blocks of samples; an incomplete last one is omitted."""
+    return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
 def every_of(samples: int) -> int:

@@ -12,12 +12,11 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
 from hmpim.identify.effects.smeared import Side, smeared_plateaus
-from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TOLERATED, TWICE
 
 __all__ = ["Saturation", "detect_saturation", "goes_beyond"]
@@ -67,20 +66,13 @@ class Saturation:
         return float(np.mean(self.clipped))
 
 
-def detect_saturation(
-    y: ArrayLike, prediction: ArrayLike | None = None, *, step: float = 0.0
-) -> Saturation:
+def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 0.0) -> Saturation:
     """Find the levels at which `y`, (n,), was clipped; None where there is no clipping.
 
     The prediction is that of a linear model, (n,). It need not be good: its gain and timing are
     corrected on the samples that are not at the level. It distinguishes a short plateau from a
     crest, and a clipped wave from a square one. `step` is that to which `y` is rounded, in its
     unit; 0 for none (see `detect_quantization`).
-
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
 
     Examples
     --------
@@ -92,16 +84,13 @@ def detect_saturation(
     >>> detect_saturation(y).high is None
     True
     """
-    samples, model = as_signal("y", y), None
-    if prediction is not None:
-        samples, model = as_pair(samples, prediction, names=("y", "the prediction"))
-    scatter = _scatter(samples)
-    high = _upper(samples, model, step, scatter)
-    low = _upper(-samples, None if model is None else -model, step, scatter)
+    scatter = _scatter(y)
+    high = _upper(y, prediction, step, scatter)
+    low = _upper(-y, None if prediction is None else -prediction, step, scatter)
     if low is not None:
         low = replace(low, level=-low.level)
-    if high is None and low is None and model is not None:  # noise may hide the plateau
-        low, high = smeared_plateaus(samples, model, step=step)
+    if high is None and low is None and prediction is not None:  # noise may hide the plateau
+        low, high = smeared_plateaus(y, prediction, step=step)
     return Saturation(low=low, high=high, tolerance=0.5 * step)
 
 

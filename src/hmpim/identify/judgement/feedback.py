@@ -72,7 +72,7 @@ def chances_without_feedback(u: Real, residuals: Real, counts: Mask | None = Non
         return np.ones(residuals.shape[0])
     inner, count = residuals[:, _AHEAD:-_AHEAD], u.size - 2 * _AHEAD
     if counts is not None:
-        inner, count = inner * counts[_AHEAD:-_AHEAD], np.count_nonzero(counts[_AHEAD:-_AHEAD])
+        inner, count = inner * counts[_AHEAD:-_AHEAD], int(np.sum(counts[_AHEAD:-_AHEAD]))
     mean = inner.sum(axis=1) / count
     variance = np.vecdot(inner, inner) / count - mean**2
     moves = u - u.mean()

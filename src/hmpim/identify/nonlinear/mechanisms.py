@@ -53,6 +53,7 @@ __all__ = [
     "play",
     "rate_limited",
     "stretch_of",
+    "through",
 ]
 
 Kind = Literal[
@@ -289,6 +290,14 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
+def through(forces: Real, denominator: Real) -> Real:
+    """Responses of dynamics without delay to forces, (k, n), given in the output's unit."""
+    first = forces[:, :1]
+    source = prepare_input(forces - first, "foh")
+    answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
+    return np.asarray(answer + first)
+
+
 def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
     """Every kind with every value to try.
 
@@ -300,13 +309,6 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
 
-    def through(forces: Real) -> Real:
-        """Responses of the dynamics, without delay, to forces given in the output's unit."""
-        first = forces[:, :1]
-        source = prepare_input(forces - first, "foh")
-        answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
-        return np.asarray(answer + first)
-
     share = x / largest
     square = largest * share**2
     cube = square * share
@@ -316,7 +318,7 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator has no restoring force
         direction = np.tanh(step / (_STICKS * fastest))
-        cubic, quadratic, friction = through(np.stack((cube, square, direction)))
+        cubic, quadratic, friction = through(np.stack((cube, square, direction)), denominator)
         yield Hypothesis(kind="hardening", trace=-cubic)
         yield Hypothesis(kind="softening", trace=cubic)
         yield Hypothesis(kind="asymmetry", trace=-quadratic)

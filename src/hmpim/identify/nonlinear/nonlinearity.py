@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, thinned
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit, thinned
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
 from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase

@@ -27,9 +27,8 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.nonlinear.fine import FINE, finely, linear_part, linear_part_finely, sampled
-from hmpim.identify.nonlinear.mechanisms import GAPS, Kind, play
+from hmpim.identify.nonlinear.mechanisms import GAPS, Kind, play, through
 from hmpim.identify.worth import MATERIAL, PART
-from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -223,11 +222,8 @@ def _forced(
     """
     z = linear_part_finely(data, fit)
     z = z if own is None else z + own
-    force = _power(z, power)
-    source = prepare_input(force - force[0], "foh")
     slower = fit.denominator * FINE ** np.arange(fit.denominator.size)
-    seen = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=slower)
-    fine = -(seen + force[0])
+    fine = -through(_power(z, power)[None], slower)[0]
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _forced(kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
