@@ -42,6 +42,7 @@ from hmpim.model.sampled import prepare_input
 __all__ = [
     "GAPS",
     "KIND_WORDS",
+    "LONGEST",
     "LONGEST_AUTOREGRESSION",
     "RATES",
     "Hypothesis",
@@ -95,8 +96,10 @@ _STICKS = 0.01
 LONGEST_AUTOREGRESSION = 10
 """Largest order of the noise model when a trace is tested."""
 
-_LONGEST = 32768
-"""Samples analysed; of a longer record, the stretch with the largest residual."""
+LONGEST = 32768
+"""Samples in which a nonlinearity is sought; of a longer record, those with the largest residual,
+means over blocks, or none where each sample is a step.
+"""
 
 _LAGS = 8
 """Samples by which a linear change of the model may shift its output, either way."""
@@ -268,12 +271,12 @@ def compare_harmonics(
 def stretch_of(residual: Real) -> slice:
     """The stretch to analyse: all, or the part of a long record with the largest residual."""
     n = residual.size
-    if n <= _LONGEST:
+    if n <= LONGEST:
         return slice(0, n)
     power = np.concatenate([[0.0], np.cumsum(residual**2)])
-    starts = np.arange(0, n - _LONGEST + 1, _LONGEST // 8)
-    start = int(starts[np.argmax(power[starts + _LONGEST] - power[starts])])
-    return slice(start, start + _LONGEST)
+    starts = np.arange(0, n - LONGEST + 1, LONGEST // 8)
+    start = int(starts[np.argmax(power[starts + LONGEST] - power[starts])])
+    return slice(start, start + LONGEST)
 
 
 def _background(problem: Problem, fit: Fit, here: slice) -> Real:

@@ -20,7 +20,7 @@ from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.fine import linear_part
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Kind
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Kind
 from hmpim.identify.nonlinear.rows import (
     TURNS,
     Command,
@@ -47,9 +47,6 @@ __all__ = [
 
 _FEWEST = 100
 """Samples that must count: many times the parameters of a model with plain dynamics."""
-
-_LONGEST = 32768
-"""Samples up to which it is tried."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,7 +86,7 @@ def is_explained(joint: JointFit) -> bool:
     """Whether plain dynamics leave white noise, so that no nonlinearity need be sought."""
     fit = joint.best.fit
     plain = fit.structure.name in PLAIN and is_white(joint.problem.counting(fit.residual))
-    return plain or fit.structure.sampled or joint.problem.y.size > _LONGEST
+    return plain or fit.structure.sampled or joint.problem.y.size > LONGEST
 
 
 def kinds_in_question(command: Command, problem: Problem, plain: Fit, best: Fit) -> list[Kind]:

@@ -16,7 +16,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.result import HarmonicCurve, Nonlinearity
 from hmpim.identify.result.digits import percent, plus_minus
@@ -26,9 +26,6 @@ from hmpim.identify.worth import MATERIAL, MOST, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "inspect_nonlinearity"]
-
-_LONGEST = 32768
-"""Samples up to which a sweep is analysed as it is; longer ones are first averaged in blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,7 +73,7 @@ def inspect_nonlinearity(
     ('curvature', ['nonlinear'])
     """
     output = float(np.std(problem.counting(problem.y)))
-    block = -(-u.size // _LONGEST)
+    block = -(-u.size // LONGEST)
     sweep = sweep_phase(thinned(u, block), fs / block)
     subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
     outcome = inspect_fit(subject, fit)
