@@ -198,8 +198,7 @@ def _may_drift(joint: JointFit) -> bool:
         return True  # the model may explain a drift
     if is_white(fit.residual):
         return False
-    spread = problem.masked(problem.y - problem.y.mean())
-    return fit.cost > PART * float(spread @ spread) or is_slow(problem, fit)
+    return fit.cost > PART * problem.spread or is_slow(problem, fit)
 
 
 def is_slow(problem: Problem, fit: Fit) -> bool:
