@@ -159,15 +159,13 @@ def integrator(evidence: Evidence) -> Iterator[Finding]:
     """Say which figures do not exist for an integrator or a zero at DC."""
     structure = evidence.joint.best.fit.structure
     if structure.dc_zeros:
-        code, why = "zero_at_dc", "A constant input does not move the output"
-        scale = "output per rate of the input"
+        why, scale = "A constant input does not move the output", "output per rate of the input"
     elif structure.integrators:
-        code, why = "integrator", "The output integrates the input"
-        scale = "output's rate per input"
+        why, scale = "The output integrates the input", "output's rate per input"
     else:
         return
     yield Finding(
-        code=code,
+        code="zero_at_dc" if structure.dc_zeros else "integrator",
         message=f"{why}: there is no gain at DC to measure bandwidths from, and the scale factor "
         f"is the {scale}.",
         severity="info",
