@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hmpim.identify.arrays import Real, averaged
+from hmpim.identify.arrays import Real, summed
 from hmpim.identify.noise.whiteness import is_steady, squares_of
 from hmpim.identify.worth import PART
 
@@ -42,9 +42,9 @@ def level_of(innovations: Real) -> Real | None:
     if innovations.size < _WINDOWS * window or is_steady(innovations):
         return None
     counted = innovations != 0.0
-    share = averaged(counted.astype(np.float64), window // 2)
-    power = averaged(squares_of(innovations), window // 2) / np.where(share > 0.0, share, 1.0)
-    power = np.where(share > 0.0, power, 1.0)
+    about = summed(counted.astype(np.float64), window // 2)
+    power = summed(squares_of(innovations), window // 2) / np.maximum(about, 1.0)
+    power = np.where(about > 0.0, power, 1.0)
     level = np.sqrt(np.maximum(power, PART**2))
     return np.asarray(level / np.exp(np.mean(np.log(level[counted]))))
 
