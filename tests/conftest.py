@@ -81,7 +81,7 @@ def field_record():
 @pytest.fixture(autouse=True)
 def breaking_checks(monkeypatch):
     """A check that raises fails the test; within ``with breaking_checks():`` it is only said."""
-    from hmpim.identify.judgement import failed as attempts
+    from hmpim.identify.judgement import checks as attempts
 
     said = attempts.failed
 

@@ -214,7 +214,7 @@ def test_a_long_record_is_looked_at_in_blocks(monkeypatch):
     y = motion("friction", 0.02)
     whole = identified(y, structures=PLAIN)["y", "u"].nonlinearity
     monkeypatch.setattr(
-        importlib.import_module("hmpim.identify.nonlinear.nonlinearity"), "_LONGEST", 1000
+        importlib.import_module("hmpim.identify.nonlinear.nonlinearity"), "LONGEST", 1000
     )
     halved = identified(y, structures=PLAIN)["y", "u"].nonlinearity
     assert halved.kinds == whole.kinds

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median"]
+__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median", "summed", "thinned"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -42,12 +42,22 @@ def averaged(values: Real, reach: int | NDArray[np.int64]) -> Real:
     >>> averaged(np.array([1.0, 2.0, 6.0]), 1).tolist()
     [1.5, 3.0, 4.0]
     """
+    return np.asarray(summed(values, reach) / summed(np.ones(values.shape[-1]), reach))
+
+
+def summed(values: Real, reach: int | NDArray[np.int64]) -> Real:
+    """The same without the division."""
     count = values.shape[-1]
     position = np.arange(count)
     begin, end = np.maximum(position - reach, 0), np.minimum(position + reach + 1, count)
     total = np.zeros((*values.shape[:-1], count + 1))
     np.cumsum(values, axis=-1, out=total[..., 1:])
-    return np.asarray((total.take(end, axis=-1) - total.take(begin, axis=-1)) / (end - begin))
+    return np.asarray(total.take(end, axis=-1) - total.take(begin, axis=-1))
+
+
+def thinned(x: Real, block: int) -> Real:
+    """Means over blocks of samples; an incomplete last one is omitted."""
+    return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
 def every_of(samples: int) -> int:

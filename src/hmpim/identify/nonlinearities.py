@@ -1,6 +1,7 @@
 """Nonlinearities of an output: in the model, or as alternatives to what the linear fit says."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -141,72 +142,53 @@ def looked_through(
     i: int,
     plain: Fit | None,
 ) -> tuple[JointFit, Inspection | None, tuple[Finding, ...]]:
-    """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity."""
-    modelled = joined.bending is not None
-    problem, fit = joint.problem, joint.best.fit
+    """The fit, plain if a nonlinearity explains the rest; and the test for nonlinearity.
+
+    Nothing is tested in a loop.
+    """
+    if question.instrument is not None:
+        return joint, None, ()
+    aligned, best, floor = question.aligned, joint.best, _floor(question, found)
+    source = aligned.inputs[i]
+    problem, fit = joint.problem, best.fit
     if joined.bending is not None:
         problem, fit = joined.bending.as_measured(joint)
-    inspection, unseen = attempt(
-        "nonlinearity",
-        lambda: _inspected(question, found, problem, fit, i, plain, modelled=modelled),
-        None,
-    )
-    if modelled:
-        return joint, inspection, unseen
-    if inspection is not None and inspection.fit is not joint.best.fit:
-        return taking(joint, inspection.fit), inspection, unseen
-    if plain is None:
-        return joint, inspection, unseen
-    bent_instead, untried = attempt("bends", lambda: _is_bent(question, found, joint, plain), False)
-    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
-
-
-def _inspected(
-    question: Question,
-    found: Imperfections,
-    problem: Problem,
-    fit: Fit,
-    i: int,
-    plain: Fit | None,
-    *,
-    modelled: bool = False,
-) -> Inspection | None:
-    """The nonlinear part of the residual; not tested in a loop."""
-    if question.instrument is not None:
-        return None
-    aligned, output = question.aligned, question.output
-    source = aligned.inputs[i]
-    return inspect_nonlinearity(
+    look = partial(
+        inspect_nonlinearity,
         source.values,
         problem,
         fit,
         fs=aligned.fs,
         plain=plain,
-        modelled=modelled,
+        modelled=joined.bending is not None,
         others=[other.values for other in aligned.inputs if other is not source],
-        floor=_floor(question, found),
-        unit=output.unit,
+        floor=floor,
+        unit=question.output.unit,
     )
+    inspection, unseen = attempt("nonlinearity", look, None)
+    if joined.bending is not None:
+        return joint, inspection, unseen
+    if inspection is not None and inspection.fit is not best.fit:
+        return taking(joint, inspection.fit), inspection, unseen
+    if plain is None or best.fit.structure.sampled:
+        return joint, inspection, unseen
+    look_at_bends = partial(
+        is_bent_instead,
+        source.values,
+        problem,
+        fit,
+        plain,
+        intersample=best.intersample,
+        fs=aligned.fs,
+        floor=floor,
+    )
+    bent_instead, untried = attempt("bends", look_at_bends, False)
+    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
 
 
 def _floor(question: Question, found: Imperfections) -> float:
     """R.m.s. of the rounding error, by the steps of the output or of the arithmetic."""
     return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
-
-
-def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
-    """Whether a plain fit and a nonlinearity replace a rich one; not tested in a loop."""
-    if question.instrument is not None or joint.best.fit.structure.sampled:
-        return False
-    return is_bent_instead(
-        question.aligned.inputs[0].values,
-        joint.problem,
-        joint.best.fit,
-        plain,
-        intersample=joint.best.intersample,
-        fs=question.aligned.fs,
-        floor=_floor(question, found),
-    )
 
 
 def possible_bends(

@@ -37,7 +37,6 @@ from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
 from hmpim.identify.reading.candidates import candidates_of
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
-from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
@@ -54,6 +53,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.worth import WORTH
+from hmpim.model.response import response_std
 from hmpim.record import Finding
 
 __all__ = ["Described", "describe", "describe_dead"]

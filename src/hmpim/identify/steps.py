@@ -12,7 +12,7 @@ from hmpim.identify.effects.imperfections import (
     Imperfections,
     refine,
 )
-from hmpim.identify.effects.lost_samples import stands_out
+from hmpim.identify.effects.lost_samples import stand_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of, started
@@ -85,7 +85,7 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     seen = _without_clusters(question, seen, fitted)
     residual = first.best.fit.residual
     limited = seen.saturation is not None or seen.hold is not None
-    if not limited and is_white(residual) and not stands_out(first.problem.counting(residual)):
+    if not limited and is_white(residual) and not stand_out(first.problem.counting(residual)):
         return seen
     prediction = fitted.prediction.copy()  # it is not valid before the free response
     prediction[: first.forgotten] = question.output.values[: first.forgotten]

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.arguments import checked, generator
+from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
-from hmpim.model.model import Model, frequency_response
+from hmpim.model.model import Model
+from hmpim.model.response import by_falling_powers, response_std
 
-__all__ = ["coefficient_vector", "draw_models", "response_error"]
+__all__ = ["coefficient_vector", "draw_models", "response_error", "with_coefficients"]
 
 _TRIES = 100
 """Draws made for each one kept, before giving up."""
@@ -30,6 +31,29 @@ def coefficient_vector(model: Model) -> NDArray[np.float64]:
     behind = 2 if model.denominator[-1] == 0.0 else 1
     return np.concatenate(
         [[rational.delay], rational.numerator[::-1], rational.denominator[behind:][::-1]]
+    )
+
+
+def with_coefficients(model: Model, vector: NDArray[np.float64]) -> Model:
+    """The model with other coefficients, in the order of `coefficient_vector`.
+
+    Raises
+    ------
+    ArgumentError
+        If they make no model: the scale factor is 0, or it is not stable.
+    """
+    above = 1 + len(model.numerator)
+    numerator = vector[1:above]
+    lowest = (1.0, 0.0) if model.denominator[-1] == 0.0 else (1.0,)
+    if not numerator.any():
+        raise ArgumentError("a scale factor of 0 is no model")
+    scale = float(numerator[np.flatnonzero(numerator)[-1]])
+    return replace(
+        model,
+        delay=float(vector[0]),
+        scale_factor=scale,
+        numerator=tuple((numerator / scale).tolist()),
+        denominator=(*vector[above:].tolist(), *lowest),
     )
 
 
@@ -60,22 +84,8 @@ def response_error(model: Model, frequency: NDArray[np.float64]) -> NDArray[np.f
     """
     if model.spread is None:
         return np.full(np.shape(frequency), np.nan)
-    s = 2j * np.pi * np.asarray(frequency, dtype=np.float64)
-    system = model.system
-    above, below = system.numerator, system.denominator
-    first = 2 if model.denominator[-1] == 0.0 else 1
-    powers = s[None, :] ** np.arange(max(above.size, below.size))[:, None]
-    slopes = np.concatenate(  # of ln G, in the order of `coefficient_vector`
-        [
-            -s[None, :],
-            (powers[: above.size] / (above @ powers[: above.size]))[::-1],
-            (-powers[first : below.size] / (below @ powers[: below.size]))[::-1],
-        ]
-    )
-    covariance = np.array(model.spread.covariance)
-    variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
-    size = np.abs(frequency_response(model, np.asarray(frequency, dtype=np.float64)))
-    return np.asarray(size * np.sqrt(np.maximum(variance, 0.0)))
+    covariance = by_falling_powers(np.array(model.spread.covariance), model.system.numerator.size)
+    return response_std(model.system, covariance, numbers_of("frequency", frequency))
 
 
 @checked
@@ -153,13 +163,6 @@ def draw_models(
 def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator) -> Model:
     spread = model.spread
     assert spread is not None
-    above = len(model.numerator)
-    numerator = vector[1 : 1 + above]
-    lowest = [1.0, 0.0] if model.denominator[-1] == 0.0 else [1.0]
-    denominator = np.concatenate([vector[1 + above :], lowest])
-    if not numerator.any():
-        raise ArgumentError("a scale factor of 0 is no model")
-    scale = float(numerator[np.flatnonzero(numerator)[-1]])
 
     def moved(value: float | None, std: float) -> float | None:
         return None if value is None else float(value + std * source.standard_normal())
@@ -167,11 +170,7 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
     noise = moved(model.noise_std, spread.noise_std)
     assert noise is not None
     return replace(
-        model,
-        delay=float(vector[0]),
-        scale_factor=scale,
-        numerator=tuple((numerator / scale).tolist()),
-        denominator=tuple(denominator.tolist()),
+        with_coefficients(model, vector),
         bias=moved(model.bias, spread.bias) or 0.0,
         noise_std=abs(noise),
         saturation_low=moved(model.saturation_low, spread.saturation_low),

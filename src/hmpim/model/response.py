@@ -20,10 +20,13 @@ __all__ = [
     "RationalDelay",
     "bandwidth_3db",
     "bandwidth_phase",
+    "by_falling_powers",
     "dominant_time_constant",
+    "log_slopes",
     "peak_gain",
     "phase",
     "response",
+    "response_std",
     "slowest_time_constant",
 ]
 
@@ -401,3 +404,57 @@ def dominant_time_constant(system: RationalDelay) -> float | None:
     if slowest.real == 0.0 or abs(slowest.imag) > 1e-9 * abs(slowest):
         return None
     return float(-1.0 / slowest.real)
+
+
+def log_slopes(
+    system: RationalDelay, frequency: NDArray[np.float64]
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
+    """Derivatives of the logarithm of a response, at each frequency in Hz, (m,).
+
+    By the delay, (1, m); the numerator, (k, m); and the denominator after its first coefficient
+    that is not zero, (l, m).
+    """
+    above, below = system.numerator, system.denominator
+    powers = system.variable(frequency)[None, :] ** np.arange(max(above.size, below.size))[:, None]
+    first = int(np.flatnonzero(below)[0]) + 1
+    return (
+        np.asarray(-2j * np.pi * frequency[None, :], dtype=np.complex128),
+        powers[: above.size] / (above @ powers[: above.size]),
+        -powers[first : below.size] / (below @ powers[: below.size]),
+    )
+
+
+def response_std(
+    system: RationalDelay, covariance: NDArray[np.float64], frequency: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Standard deviation of a response, sqrt(E|error|²), at each frequency in Hz, (m,).
+
+    To first order, in the response's unit. The covariance, (q, q), is that of the parameters of
+    `log_slopes`, in their order.
+
+    Examples
+    --------
+    A delay that is known to 1 ms turns the response by 2π/1000 at 1 Hz:
+
+    >>> late = RationalDelay(delay=0.1, numerator=np.ones(1), denominator=np.ones(1))
+    >>> response_std(late, np.diag([1e-6, 0.0]), np.array([1.0])).round(6).tolist()
+    [0.006283]
+    """
+    slopes = np.concatenate(log_slopes(system, frequency))
+    variance = np.sum(slopes.conj() * (covariance @ slopes), axis=0).real
+    return np.asarray(np.abs(response(system, frequency)) * np.sqrt(np.maximum(variance, 0.0)))
+
+
+def by_falling_powers(covariance: NDArray[np.float64], numerator: int) -> NDArray[np.float64]:
+    """The same covariance by falling powers for rising ones, or by rising for falling ones.
+
+    `numerator` is the number of the numerator's coefficients.
+
+    Examples
+    --------
+    >>> by_falling_powers(np.diag([0.0, 1.0, 2.0, 3.0, 4.0]), 2).diagonal().tolist()
+    [0.0, 2.0, 1.0, 4.0, 3.0]
+    """
+    above = 1 + numerator
+    order = [0, *range(1, above)[::-1], *range(above, covariance.shape[0])[::-1]]
+    return covariance[np.ix_(order, order)]

@@ -9,6 +9,7 @@ from hmpim.identify.effects.censored import fit_censored
 from hmpim.identify.effects.held import rows_at_updates
 from hmpim.identify.effects.hold import Updates, detect_hold, updates
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
+from hmpim.identify.effects.smeared import Side
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.threads import one_thread
@@ -146,8 +147,8 @@ def test_without_noise_the_truth_is_found(source, clean, truth):
         detect_saturation(np.clip(clean, -0.6, 0.7), clean),
         detect_saturation(np.maximum(clean, -0.6), clean),
     ):
-        low = -np.inf if saturation.low is None else saturation.low
-        high = np.inf if saturation.high is None else saturation.high
+        low = -np.inf if saturation.low is None else saturation.low.level
+        high = np.inf if saturation.high is None else saturation.high.level
         y = np.clip(clean, low, high)
         problem = Problem(source=source, y=y, valid=None, longest_delay=1000.0)
         plain = fit_structure(problem, STRUCTURE, truth.theta)
@@ -229,17 +230,9 @@ def test_rows_between_samples_agree_with_another_delay(intersample):
 def test_a_record_that_is_all_clipped_is_refused(source, clean):
     problem = Problem(source=source, y=np.full(clean.size, 0.5), valid=None, longest_delay=9.0)
     fit = fit_structure(problem, STRUCTURES["static"], np.zeros(1))
-    nothing = np.zeros(clean.size, dtype=bool)
-    full = Saturation(
-        low=None,
-        high=0.5,
-        low_std=None,
-        high_std=0.0,
-        clipped_low=nothing,
-        clipped_high=~nothing,
-        noise="before",
-        tolerance=0.0,
-    )
+    every = np.ones(clean.size, dtype=bool)
+    top = Side(level=0.5, std=0.0, at=every, exact=True)
+    full = Saturation(low=None, high=top, tolerance=0.0)
     with pytest.raises(RecordError, match="0 of 2000 samples are inside the range"):
         fit_censored(problem, fit, full)
 

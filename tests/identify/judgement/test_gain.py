@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hmpim.identify.effects.gain import GainChange
-from hmpim.identify.judgement.gain import gain_change
+from hmpim.identify.judgement.bent import gain_change
 
 
 def change(evidence, *, taken, share=0.0, others=()):

@@ -59,6 +59,18 @@ def test_an_integrator_and_a_pole_far_beyond_the_rate_are_borne():
     assert found[0] == pytest.approx(response(tail, np.array([0.1]))[0] * held, rel=1e-4)
 
 
+def test_an_integrator_behind_many_poles_is_the_sum_of_its_aliases():
+    """With one more integrator for the linear input it came out a thousand times too small."""
+    below = np.polynomial.polynomial.polyfromroots([0.0, -0.4, -0.5, -0.7, -1.5, -2.0])
+    system = RationalDelay(delay=-0.03, numerator=np.array([1.0, 0.5]), denominator=below)
+    found = sampled_response(system, np.array([0.5, 17.0]), fs=FS, intersample="foh")
+    for at, value in zip((0.5, 17.0), found, strict=True):
+        aliases = at + FS * np.arange(-2000, 2001)
+        each = response(system, np.abs(aliases))
+        each = np.where(aliases > 0.0, each, each.conj()) * np.sinc(aliases / FS) ** 2
+        assert value == pytest.approx(each.sum(), rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["first", "second"])
 def test_gain_and_phase_behind_a_held_input_are_the_systems(name):
     """Aliases left out, the first-order lag was read tens of standard deviations off."""

@@ -217,7 +217,10 @@ def test_noise_alone_is_unrelated():
     record = Record.from_arrays(
         {"u": chirped(0).inputs[0].values}, {"y": rng.standard_normal(2000)}, fs=FS
     )
-    assert identify(compress(record)).verdict == "not_identifiable"
+    (together,), (alone,) = identify(compress(record)), identify(record)
+    assert together.verdict == alone.verdict == "not_identifiable"
+    assert together.noise_std.value == pytest.approx(alone.noise_std.value, rel=1e-2)
+    assert together.noise_std.verdict == alone.noise_std.verdict == "doubtful"
 
 
 @pytest.mark.parametrize("lags", [1, 5, 10])

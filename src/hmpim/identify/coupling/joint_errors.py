@@ -8,14 +8,11 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.least_squares import without
+from hmpim.identify.fitting.least_squares import UNSEEN, without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 
 __all__ = ["common", "covariances", "derivatives", "gained_by"]
-
-_UNSEEN = 1e-13
-"""Share of the greatest eigenvalue below which the record does not determine a direction."""
 
 
 def common(masks: Iterable[Mask | None]) -> Mask | None:
@@ -99,7 +96,7 @@ def _joint_covariance(rows: Real, residual: Real, *, freedom: int) -> Real:
     scale = np.sqrt(np.maximum(np.sum(moved**2, axis=1), np.finfo(float).tiny ** 0.5))
     scaled = moved / scale[:, None]
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
-    spread = vectors / np.sqrt(np.maximum(values, _UNSEEN * values[-1]))
+    spread = vectors / np.sqrt(np.maximum(values, UNSEEN * values[-1]))
     inner = spread @ spread.T / np.outer(scale, scale)
     mixed = -inner @ mean
     last = np.array([[1.0 / power - mean @ mixed]])

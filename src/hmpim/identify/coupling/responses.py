@@ -4,8 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hmpim.errors import RecordError
 from hmpim.identify.arrays import Mask
@@ -102,10 +104,8 @@ def responses_of(
         columns=tuple(_column(pieces, j) for j in range(len(aligned.inputs))),
         coherence=OutputCoherence(
             output=output.name,
-            frequency=np.concatenate([np.zeros(0), *(m.frequency for _, m in pieces)]),
-            multiple=np.concatenate(
-                [np.zeros(0), *(m.multiple_coherence[:, 0] for _, m in pieces)]
-            ),
+            frequency=_joined([m.frequency for _, m in pieces]),
+            multiple=_joined([m.multiple_coherence[:, 0] for _, m in pieces]),
         ),
         left=cache(
             lambda: misfits_of_inputs(
@@ -162,17 +162,18 @@ def _pieces(
 
 def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
     """One input's response at the frequencies where the inputs are distinguished."""
-    own = [(m, active.index(j), m.usable) for active, m in pieces if j in active]
+    own = [(m, (m.usable, 0, active.index(j))) for active, m in pieces if j in active]
     return FrequencyResponse(
-        frequency=np.concatenate([np.zeros(0), *(m.frequency[known] for m, _, known in own)]),
-        response=np.concatenate(
-            [np.zeros(0, np.complex128), *(m.response[known, 0, k] for m, k, known in own)]
-        ),
-        std=np.concatenate([np.zeros(0), *(m.std[known, 0, k] for m, k, known in own)]),
-        coherence=np.concatenate(
-            [np.zeros(0), *(m.partial_coherence[known, 0, k] for m, k, known in own)]
-        ),
+        frequency=_joined([m.frequency[m.usable] for m, _ in own]),
+        response=np.asarray(_joined([m.response[at] for m, at in own]), dtype=np.complex128),
+        std=_joined([m.std[at] for m, at in own]),
+        coherence=_joined([m.partial_coherence[at] for m, at in own]),
     )
+
+
+def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """All parts, if any, one after the other."""
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def unrelated(output: str, source: str, response: FrequencyResponse) -> Finding:

@@ -179,11 +179,11 @@ def _data(
     if saturation is not None:
         after = saturation.noise == "after"
         if saturation.low is not None:
-            low = saturation.clipped_low[arrivals.index]
-            low_edge = saturation.low + saturation.tolerance - moved
+            low = saturation.low.at[arrivals.index]
+            low_edge = saturation.low.level + saturation.tolerance - moved
         if saturation.high is not None:
-            high = saturation.clipped_high[arrivals.index]
-            high_edge = saturation.high - saturation.tolerance - moved
+            high = saturation.high.at[arrivals.index]
+            high_edge = saturation.high.level - saturation.tolerance - moved
     return _Data(
         problem=problem,
         arrivals=arrivals,

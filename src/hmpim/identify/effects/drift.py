@@ -52,7 +52,6 @@ _Steadily = Callable[[JointFit], JointFit | None]
 class Drifting:
     """A fit with a bias that drifts."""
 
-    joint: JointFit  # of the output without the drift, whose rows stay free; the bias is the mean
     trend: Real  # (n,): the drift, zero on average, in the output's unit
     steady: bool  # whether the drift is a straight line
     # mean rate over the record and its standard deviation, in the output's unit per sample
@@ -145,14 +144,14 @@ def _unless_steady(
     )
     across = (columns[:, -1] - columns[:, 0]) / (weighed.y.size - 1)
     drifting = Drifting(
-        joint=without_rows(joint, slice(len(columns))),
         trend=weights @ columns,
         steady=len(columns) == 1,
         rate=float(across @ weights),
         rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
         rival=rival,
     )
-    return drifting.joint, drifting
+    # The rows of the drift stay free; the bias is the mean.
+    return without_rows(joint, slice(len(columns))), drifting
 
 
 def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
@@ -199,8 +198,7 @@ def _may_drift(joint: JointFit) -> bool:
         return True  # the model may explain a drift
     if is_white(fit.residual):
         return False
-    spread = problem.masked(problem.y - problem.y.mean())
-    return fit.cost > PART * float(spread @ spread) or is_slow(problem, fit)
+    return fit.cost > PART * problem.spread or is_slow(problem, fit)
 
 
 def is_slow(problem: Problem, fit: Fit) -> bool:

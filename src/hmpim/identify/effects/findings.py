@@ -24,12 +24,9 @@ def with_imperfections(
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
     figures = {}
     if clipping is not None:
-        for name, level, std in (
-            ("saturation_low", clipping.low, clipping.low_std),
-            ("saturation_high", clipping.high, clipping.high_std),
-        ):
-            if level is not None:
-                figures[name] = estimate(level, (std or 0.0) ** 2, unit=unit)
+        for name, side in (("saturation_low", clipping.low), ("saturation_high", clipping.high)):
+            if side is not None:
+                figures[name] = estimate(side.level, side.std**2, unit=unit)
     if hold is not None:
         figures["hold_period"] = estimate(hold.period, hold.std**2, unit="s")
     if rounding is not None:
@@ -51,9 +48,9 @@ def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Itera
     if clipping is not None:
         much = clipping.share > NEARLY * MOST  # a rectifier clips half
         levels = [
-            f"{name} {level:.6g} {unit}".rstrip()
-            for name, level in (("low", clipping.low), ("high", clipping.high))
-            if level is not None
+            f"{name} {side.level:.6g} {unit}".rstrip()
+            for name, side in (("low", clipping.low), ("high", clipping.high))
+            if side is not None
         ]
         yield Finding(
             code="saturation",

@@ -20,7 +20,7 @@ from hmpim.identify.effects.lost_samples import (
     find_repeated,
     find_spikes,
     find_stuck,
-    stands_out,
+    stand_out,
 )
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
@@ -256,7 +256,7 @@ def _spikes(censored: CensoredFit, saturation: Saturation | None) -> Mask | None
     counted = residual[inside]
     if saturation is not None:
         inside &= ~saturation.clipped
-    if not stands_out(counted) or not inside.any():
+    if not stand_out(counted) or not inside.any():
         return None
     bulk = float(np.median(np.abs(residual[inside]))) / BULK
     far = np.abs(residual) > TWICE * DEVIATIONS * bulk

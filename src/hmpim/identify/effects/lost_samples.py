@@ -21,7 +21,6 @@ __all__ = [
     "find_spikes",
     "find_stuck",
     "stand_out",
-    "stands_out",
 ]
 
 _LONGEST_SPIKE = 3
@@ -34,20 +33,16 @@ _LONGEST_COPY = 3
 """Most samples in a row that copy the frame before a lost one."""
 
 
-def stands_out(residual: Real) -> bool:
-    """Whether any sample is far beyond the bulk of a residual; quick, needs no model.
+def stand_out(residuals: Real) -> Mask:
+    """Which residuals, (..., n), have a sample far beyond their bulk, (...); quick, needs no model.
 
     Examples
     --------
-    >>> noise = np.random.default_rng(0).standard_normal(1000)
-    >>> stands_out(noise), stands_out(np.append(noise, 20.0))
-    (False, True)
+    >>> noise = np.random.default_rng(0).standard_normal((2, 1000))
+    >>> noise[1, 500] = 20.0
+    >>> stand_out(noise).tolist()
+    [False, True]
     """
-    return bool(stand_out(residual))
-
-
-def stand_out(residuals: Real) -> Mask:
-    """The same for many residuals, shape (..., n): which of them have such a sample, (...)."""
     some = slice(None, None, every_of(residuals.shape[-1]))
     away = np.abs(residuals - np.median(residuals[..., some], axis=-1, keepdims=True))
     bulk = np.median(away[..., some], axis=-1)
@@ -71,7 +66,7 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     """
     residual = y - prediction
     counted = residual if clipped is None else residual[~clipped]
-    if counted.size < 2 * _WINDOW or not stands_out(counted):
+    if counted.size < 2 * _WINDOW or not stand_out(counted):
         return None
     bulk = float(np.median(np.abs(counted - np.median(counted)))) / BULK
     if clipped is not None:

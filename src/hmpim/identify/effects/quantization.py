@@ -37,12 +37,11 @@ _SOME = 256
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantization:
-    """Rounding of a signal to a grid, offset + k step."""
+    """Rounding of a signal to a grid."""
 
     # distance between neighbouring levels, and its standard deviation, in the signal's unit
     step: float
     std: float
-    offset: float  # one of the levels, between 0 and `step`
     exact: bool  # every value but the extremes lies on the grid; False if something was added later
 
     @property
@@ -166,7 +165,6 @@ def _multiples(levels: Real, gaps: Real, step: float) -> Quantization | None:
         step=step,
         # The precision of a float limits that of the step.
         std=float(max(max(error, rounding) / np.sqrt(spread), np.finfo(float).eps * step)),
-        offset=float(offset % step),
         exact=True,
     )
 
@@ -226,6 +224,4 @@ def _sharpened(samples: Real, step: float, span: float) -> Quantization | None:
     error = float(np.std(samples - origin - step * k))
     if error > NEARLY * step / np.sqrt(12):  # no nearer to the grid than arbitrary values
         return None
-    return Quantization(
-        step=step, std=float(error / np.sqrt(spread)), offset=float(origin % step), exact=False
-    )
+    return Quantization(step=step, std=float(error / np.sqrt(spread)), exact=False)

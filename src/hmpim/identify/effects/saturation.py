@@ -12,12 +12,11 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
 from hmpim.identify.effects.smeared import Side, smeared_plateaus
-from hmpim.identify.signals import as_pair, as_signal
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TOLERATED, TWICE
 
 __all__ = ["Saturation", "detect_saturation", "goes_beyond"]
@@ -40,25 +39,26 @@ _VISITS = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Saturation:
-    """Clipping of a signal, with the standard deviation of each level."""
+    """Clipping of a signal at its lower and upper level; None where it is not clipped."""
 
-    # levels and their standard deviations, in the signal's unit; None where nothing is clipped
-    low: float | None
-    high: float | None
-    low_std: float | None
-    high_std: float | None
-    # (n,): samples at the level; if noise was added after clipping, those within 3.9 of its
-    # standard deviations, or whose prediction lies beyond the level
-    clipped_low: Mask
-    clipped_high: Mask
-    # Noise before the clipping leaves equal values at a level; noise after it scatters them.
-    noise: Literal["before", "after"]
+    low: Side | None
+    high: Side | None
     tolerance: float  # half the rounding step: a value so far inside the level may read as it
 
     @property
+    def sides(self) -> tuple[Side, ...]:
+        """The levels at which it is clipped."""
+        return tuple(side for side in (self.low, self.high) if side is not None)
+
+    @property
+    def noise(self) -> Literal["before", "after"]:
+        """Whether noise was added before the clipping, or after it."""
+        return "before" if all(side.exact for side in self.sides) else "after"
+
+    @property
     def clipped(self) -> Mask:
-        """Samples at either level, shape (n,)."""
-        return self.clipped_low | self.clipped_high
+        """Samples at either level, shape (n,); there must be one."""
+        return np.asarray(np.logical_or.reduce([side.at for side in self.sides]))
 
     @property
     def share(self) -> float:
@@ -66,9 +66,7 @@ class Saturation:
         return float(np.mean(self.clipped))
 
 
-def detect_saturation(
-    y: ArrayLike, prediction: ArrayLike | None = None, *, step: float = 0.0
-) -> Saturation:
+def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 0.0) -> Saturation:
     """Find the levels at which `y`, (n,), was clipped; None where there is no clipping.
 
     The prediction is that of a linear model, (n,). It need not be good: its gain and timing are
@@ -76,43 +74,24 @@ def detect_saturation(
     crest, and a clipped wave from a square one. `step` is that to which `y` is rounded, in its
     unit; 0 for none (see `detect_quantization`).
 
-    Raises
-    ------
-    RecordError
-        For the wrong shape, unequal lengths, NaN or infinity.
-
     Examples
     --------
     >>> import numpy as np
     >>> y = np.sin(np.arange(1000) / 50)
     >>> found = detect_saturation(np.clip(y, -2.0, 0.8))
-    >>> found.high, found.low
+    >>> found.high.level, found.low
     (0.8, None)
     >>> detect_saturation(y).high is None
     True
     """
-    samples, model = as_signal("y", y), None
-    if prediction is not None:
-        samples, model = as_pair(samples, prediction, names=("y", "the prediction"))
-    scatter = _scatter(samples)
-    high = _upper(samples, model, step, scatter)
-    low = _upper(-samples, None if model is None else -model, step, scatter)
+    scatter = _scatter(y)
+    high = _upper(y, prediction, step, scatter)
+    low = _upper(-y, None if prediction is None else -prediction, step, scatter)
     if low is not None:
         low = replace(low, level=-low.level)
-    if high is None and low is None and model is not None:  # noise may hide the plateau
-        low, high = smeared_plateaus(samples, model, step=step)
-    nothing = np.zeros(samples.size, dtype=bool)
-    exact = all(side.exact for side in (low, high) if side is not None)
-    return Saturation(
-        low=None if low is None else low.level,
-        high=None if high is None else high.level,
-        low_std=None if low is None else low.std,
-        high_std=None if high is None else high.std,
-        clipped_low=nothing if low is None else low.at,
-        clipped_high=nothing if high is None else high.at,
-        noise="before" if exact else "after",
-        tolerance=0.5 * step,
-    )
+    if high is None and low is None and prediction is not None:  # noise may hide the plateau
+        low, high = smeared_plateaus(y, prediction, step=step)
+    return Saturation(low=low, high=high, tolerance=0.5 * step)
 
 
 def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> Side | None:
@@ -273,12 +252,10 @@ def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
     >>> goes_beyond(found, y, wave), goes_beyond(found, y, y)
     (True, False)
     """
-    sides = ((found.low, found.clipped_low, -1.0), (found.high, found.clipped_high, 1.0))
-    for level, at, sign in sides:
-        if level is None:
-            continue
-        ahead = _beyond(sign * y, sign * level, at, sign * prediction, 0.0)
-        if ahead is not None and _is_passed(*ahead, at, ROUNDING * float(np.ptp(y))):
+    for side in found.sides:
+        sign = -1.0 if side is found.low else 1.0
+        ahead = _beyond(sign * y, sign * side.level, side.at, sign * prediction, 0.0)
+        if ahead is not None and _is_passed(*ahead, side.at, ROUNDING * float(np.ptp(y))):
             return True
     return False
 

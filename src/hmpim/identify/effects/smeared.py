@@ -29,12 +29,14 @@ _STARTS = (0.6, 0.75, 0.85, 0.92, 0.97)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Side:
-    """A level, its standard deviation, the samples at it, and whether they are equal."""
+    """A level at which a signal was clipped."""
 
-    level: float
-    std: float
+    level: float  # in the signal's unit
+    std: float  # its standard deviation
+    # (n,): samples at the level; if noise was added after clipping, those within 3.9 of its
+    # standard deviations, or whose prediction lies beyond the level
     at: Mask
-    exact: bool
+    exact: bool  # whether they are equal: noise after the clipping scatters them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -5,14 +5,12 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.noise.covariance import WELL
 
 __all__ = ["UNSEEN", "added", "explained", "inverted", "solved", "solved_exactly", "without"]
 
 UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not determine a direction."""
-
-_WELL = 1e-4
-"""Least element of a triangular factor down to which all directions are determined."""
 
 _EXACTLY = 1e-14
 """The same share without normal equations."""
@@ -39,7 +37,7 @@ def solved(gram: Real, moment: Real, damping: float = 0.0) -> Real:
     scale = np.sqrt(np.where(diagonal > 1e-200 * diagonal.max(), diagonal, 1.0))
     scaled = gram / (scale[:, None] * scale)
     factor, info = scipy.linalg.lapack.dpotrf(scaled)
-    if not info and factor.diagonal().min() > _WELL:
+    if not info and factor.diagonal().min() > WELL:
         if damping:
             scaled.flat[:: scale.size + 1] += damping
             factor, _ = scipy.linalg.lapack.dpotrf(scaled)

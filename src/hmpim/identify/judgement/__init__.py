@@ -7,17 +7,14 @@ errors           wide error bars, a fit that did not converge
 reach            outside the band, before the start of the record, after its end
 structure        other numbers of poles that the record does not exclude
 between_samples  other assumptions about the input between its samples
-bent             figures that a nonlinearity has moved
+bent             figures that a nonlinearity or a changing gain has moved
 feedback         an input that responds to the noise
-gain             a gain that changes along the record
 response         bandwidths that the measured response contradicts
-failed           a check that raises, without loss of the others
 verdict          from findings to a verdict for each parameter and for the pair
 """
 
-from hmpim.identify.judgement.checks import CHECKS, judge
+from hmpim.identify.judgement.checks import CHECKS, attempt, judge
 from hmpim.identify.judgement.evidence import Evidence
-from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.verdict import all_doubtful, judged, judged_together, unfollowed
 
 __all__ = [

@@ -2,21 +2,22 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from typing import TypeVar
 
 from hmpim.identify.judgement import reach, residual
-from hmpim.identify.judgement.bent import bent
+from hmpim.identify.judgement.bent import bent, gain_change
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
 from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
 from hmpim.identify.judgement.evidence import Evidence
-from hmpim.identify.judgement.failed import attempt
 from hmpim.identify.judgement.feedback import feedback
-from hmpim.identify.judgement.gain import gain_change
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
 from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import UNKNOWN, doubted
 from hmpim.record import Finding
 
-__all__ = ["CHECKS", "Check", "judge"]
+__all__ = ["CHECKS", "Check", "attempt", "judge"]
+
+T = TypeVar("T")
 
 Check = Callable[[Evidence], Iterable[Finding]]
 """A function from the evidence to findings."""
@@ -102,3 +103,30 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
 def _findings_of(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
     """Run a generator to its end."""
     return tuple(check(evidence))
+
+
+def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
+    """Return what `look` returns; if it raises, return `otherwise` and a finding.
+
+    Examples
+    --------
+    >>> attempt("half", lambda: 1 / 2, 0.0)
+    (0.5, ())
+    >>> attempt("ratio", lambda: 1 / 0, 0.0)[1][0].message[:57]
+    "The check 'ratio' failed to run (ZeroDivisionError: divis"
+    """
+    try:
+        return look(), ()
+    except Exception as error:  # whatever it is, the result stands without this check
+        return otherwise, (failed(name, error),)
+
+
+def failed(name: str, error: Exception) -> Finding:
+    """Report which check raised, and what."""
+    return Finding(
+        code="check_failed",
+        message=f"The check {name.replace('_', ' ')!r} failed to run ({type(error).__name__}: "
+        f"{error}). The rest of the result is unaffected; please report the record.",
+        severity="info",
+        parameters=(),
+    )

@@ -47,6 +47,11 @@ class Evidence:
         return self.u.size > 0
 
     @property
+    def residual(self) -> Real:
+        """Residual at the samples that count."""
+        return self.joint.problem.counting(self.joint.best.fit.residual)
+
+    @property
     def of_other_poles(self) -> tuple[str, ...]:
         """Figures that other poles would move.
 

@@ -159,21 +159,18 @@ def integrator(evidence: Evidence) -> Iterator[Finding]:
     """Say which figures do not exist for an integrator or a zero at DC."""
     structure = evidence.joint.best.fit.structure
     if structure.dc_zeros:
-        yield Finding(
-            code="zero_at_dc",
-            message="A constant input does not move the output: there is no gain at DC to measure "
-            "bandwidths from, and the scale factor is the output per rate of the input.",
-            severity="info",
-            parameters=("scale_factor", *_BANDWIDTHS),
-        )
+        why, scale = "A constant input does not move the output", "output per rate of the input"
     elif structure.integrators:
-        yield Finding(
-            code="integrator",
-            message="The output integrates the input: there is no gain at DC to measure bandwidths "
-            "from, and the scale factor is the output's rate per input.",
-            severity="info",
-            parameters=("scale_factor", *_BANDWIDTHS),
-        )
+        why, scale = "The output integrates the input", "output's rate per input"
+    else:
+        return
+    yield Finding(
+        code="zero_at_dc" if structure.dc_zeros else "integrator",
+        message=f"{why}: there is no gain at DC to measure bandwidths from, and the scale factor "
+        f"is the {scale}.",
+        severity="info",
+        parameters=("scale_factor", *_BANDWIDTHS),
+    )
 
 
 def beyond_band(evidence: Evidence) -> Iterator[Finding]:

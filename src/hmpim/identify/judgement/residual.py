@@ -139,9 +139,9 @@ def uneven_noise(evidence: Evidence) -> Iterator[Finding]:
     """
     if not evidence.jittered:
         return
-    u, valid = evidence.u, evidence.joint.problem.valid
+    u, problem = evidence.u, evidence.joint.problem
     fast = np.convolve(np.diff(u, 4) ** 2, np.ones(_FAST) / _FAST, mode="full")[2 : 2 + u.size]
-    power, fast = _counted(evidence) ** 2, fast if valid is None else fast[valid]
+    power, fast = evidence.residual**2, problem.counting(fast)
     if power.size < _FAST or np.ptp(power) == 0.0 or np.ptp(fast) == 0.0:
         return
     related = float(np.corrcoef(power, fast)[0, 1])
@@ -189,7 +189,7 @@ def noise_colour_of(evidence: Evidence) -> Iterator[Finding]:
     """Say which colour a residual has that is not white."""
     if evidence.readings.white:
         return
-    colour = noise_colour(_counted(evidence), evidence.fs)
+    colour = noise_colour(evidence.residual, evidence.fs)
     if colour.description == "white":  # none of the known colours
         return
     yield Finding(
@@ -233,7 +233,7 @@ def unsampled_input(evidence: Evidence) -> Iterator[Finding]:
         return
     frequency = np.arange(1, size // 2 + 1, every) / size * evidence.fs
     gain = np.abs(response(evidence.readings.system, frequency)) ** 2
-    noise = float(np.mean(_counted(evidence) ** 2))
+    noise = float(np.mean(evidence.residual**2))
     share = every * float(folded @ gain) / noise if noise > 0.0 else 0.0
     if share <= 2 * FEW:
         return
@@ -260,9 +260,3 @@ def folded_power(u: Real, fs: float, *, every: int = 1) -> Real:
         return np.zeros(bins.size)
     frequency = bins / u.size * fs
     return np.asarray(lines.end * (2.0 * (1.0 - frequency / fs)) ** -steep)
-
-
-def _counted(evidence: Evidence) -> Real:
-    """Residual at the valid samples."""
-    residual, valid = evidence.joint.best.fit.residual, evidence.joint.problem.valid
-    return residual if valid is None else residual[valid]

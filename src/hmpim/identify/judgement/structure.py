@@ -49,28 +49,27 @@ def _plainer(evidence: Evidence) -> Iterator[Finding]:
     if not rivals:
         return
     rival = min(rivals, key=lambda trial: trial.criterion).fit
-    yield Finding(
-        code="structure",
-        message=f"This record barely distinguishes the {structure_in_words(name)} model from the "
+    yield _undecided(
+        f"This record barely distinguishes the {structure_in_words(name)} model from the "
         f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
         f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or sweep "
-        "higher, to tell.",
-        severity="info",
-        parameters=PHASE_SPLIT,
+        "higher, to tell."
     )
 
 
 def barely_distinguished(chosen: str, *, poles: int, delay: float) -> Finding:
     """Say that a structure with one more pole, and a delay in s, is as likely as the chosen one."""
-    return Finding(
-        code="structure",
-        message=f"This record barely distinguishes {poles - 1} from {poles} poles. A "
+    return _undecided(
+        f"This record barely distinguishes {poles - 1} from {poles} poles. A "
         f"{structure_in_words(chosen)} model is taken; with one more pole the delay would be "
         f"{delay:.4g} s. The intervals cover this. Lower the noise, or "
-        "sweep higher, to distinguish them.",
-        severity="info",
-        parameters=PHASE_SPLIT,
+        "sweep higher, to distinguish them."
     )
+
+
+def _undecided(message: str) -> Finding:
+    """Say that another structure is as likely, without a doubt."""
+    return Finding(code="structure", message=message, severity="info", parameters=PHASE_SPLIT)
 
 
 def _poles(order: int) -> str:
@@ -107,19 +106,13 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
             parameters=evidence.of_other_poles,
         )
     elif hidden.may_hide:
-        yield Finding(
-            code="structure",
-            message=f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would "
+        yield _undecided(
+            f"A further pole with a time constant of up to {hidden.limit / fs:.3g} s would "
             "not show in this record, and would shorten the delay by as much; the intervals cover "
-            "it. Lower the noise, or sweep higher.",
-            severity="info",
-            parameters=PHASE_SPLIT,
+            "it. Lower the noise, or sweep higher."
         )
     elif close and matters:
-        yield Finding(
-            code="structure",
-            message=f"The record almost requires dynamics other than {poles}: {level}. {close}"
-            "Lower the noise, or sweep higher.",
-            severity="info",
-            parameters=PHASE_SPLIT,
+        yield _undecided(
+            f"The record almost requires dynamics other than {poles}: {level}. {close}"
+            "Lower the noise, or sweep higher."
         )

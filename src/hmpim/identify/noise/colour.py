@@ -27,24 +27,12 @@ _NEIGHBOURS = 30
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NoiseColour:
-    """Colour of a noise.
+    """Colour of a noise."""
 
-    Parameters
-    ----------
-    kind : {'white', 'autoregressive', 'power_law'}
-        The likelier description, apart from a line.
-    coefficient : float
-        Correlation between one sample and the next: the AR(1) coefficient.
-    exponent : float
-        α of a power spectrum that goes as f^-α; 0 is white, 1 flicker, 2 random walk.
-    line_frequency : float or None
-        Frequency of the strongest line above the noise, Hz.
-    """
-
-    kind: Colour
-    coefficient: float
-    exponent: float
-    line_frequency: float | None
+    kind: Colour  # the likelier description, apart from a line
+    coefficient: float  # correlation between one sample and the next: the AR(1) coefficient
+    exponent: float  # α of a power spectrum as f^-α; 0 is white, 1 flicker, 2 random walk
+    line_frequency: float | None  # of the strongest line above the noise, Hz
 
     @property
     def description(self) -> str:
@@ -63,21 +51,11 @@ class NoiseColour:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drift:
-    """Drift of the bias over the record.
+    """Drift of the bias over the record."""
 
-    Parameters
-    ----------
-    slope : float
-        The residual's unit per second.
-    std : float
-        Its standard deviation, for noise of any colour.
-    probability : float
-        Chance of so great a slope without any drift.
-    """
-
-    slope: float
-    std: float
-    probability: float
+    slope: float  # the residual's unit per second
+    std: float  # its standard deviation, for noise of any colour
+    probability: float  # chance of so great a slope without any drift
 
 
 def noise_colour(residual: Real, fs: float) -> NoiseColour:

@@ -17,9 +17,9 @@ from hmpim.identify.noise.autoregression import autoregressive_spectrum, yule_wa
 from hmpim.identify.noise.whiteness import is_steady
 from hmpim.identify.worth import PART
 
-__all__ = ["covariance", "white_covariance"]
+__all__ = ["WELL", "covariance", "white_covariance"]
 
-_WELL = 1e-4
+WELL = 1e-4
 """Least diagonal element of a triangular factor that normal equations give accurately."""
 
 
@@ -85,7 +85,7 @@ def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
 def _inverse_factor(gram: Real) -> Real | None:
     """Inverse of a Gram matrix's triangular factor; None where it is too inaccurate."""
     factor, info = scipy.linalg.lapack.dpotrf(gram)
-    return None if info or factor.diagonal().min() <= _WELL else np.linalg.inv(factor)
+    return None if info or factor.diagonal().min() <= WELL else np.linalg.inv(factor)
 
 
 def _orthonormal(gram: Real, rows: Real, scale: Real) -> tuple[Real, Callable[[], Real]]:

@@ -19,18 +19,11 @@ __all__ = ["InputNoise", "input_noise"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputNoise:
-    """White noise on the input.
+    """White noise on the input."""
 
-    Parameters
-    ----------
-    std : float
-        Standard deviation, in the input's unit.
-    attenuation : float
-        Share by which gains are underestimated on average over the band: the noise's share of the
-        power in it.
-    """
-
-    std: float
+    std: float  # in the input's unit
+    # share by which gains are underestimated on average over the band: the noise's share of the
+    # power in it
     attenuation: float
 
 

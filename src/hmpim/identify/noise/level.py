@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, summed
 from hmpim.identify.noise.whiteness import is_steady, squares_of
 from hmpim.identify.worth import PART
 
@@ -41,16 +41,10 @@ def level_of(innovations: Real) -> Real | None:
     window = max(innovations.size // _PARTS, _FEWEST)
     if innovations.size < _WINDOWS * window or is_steady(innovations):
         return None
-    index, reach = np.arange(innovations.size), window // 2
-    last, first = np.minimum(index + reach + 1, index.size), np.maximum(index - reach, 0)
-
-    def summed(values: Real) -> Real:
-        sums = np.concatenate([[0.0], np.cumsum(values)])
-        return np.asarray(sums[last] - sums[first])
-
     counted = innovations != 0.0
-    about = summed(counted.astype(np.float64))
-    power = np.where(about > 0.0, summed(squares_of(innovations)) / np.maximum(about, 1.0), 1.0)
+    about = summed(counted.astype(np.float64), window // 2)
+    power = summed(squares_of(innovations), window // 2) / np.maximum(about, 1.0)
+    power = np.where(about > 0.0, power, 1.0)
     level = np.sqrt(np.maximum(power, PART**2))
     return np.asarray(level / np.exp(np.mean(np.log(level[counted]))))
 

@@ -22,19 +22,12 @@ _NEAR = 24
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """How much of the residual still follows the input.
+    """How much of the residual still follows the input."""
 
-    Parameters
-    ----------
-    share : float
-        Share of the residual's in-band power that a smooth response to the input explains,
-        beyond what noise would; 0 when none.
-    probability : float
-        Chance of so much, or more, if the model were right.
-    """
-
+    # of the residual's in-band power, explained by a smooth response to the input beyond what
+    # noise would explain; 0 when none
     share: float
-    probability: float
+    probability: float  # chance of so much, or more, if the model were right
 
 
 def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) -> Misfit:

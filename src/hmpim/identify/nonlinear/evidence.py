@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, thinned
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, searched
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -20,7 +20,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, co
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
-__all__ = ["Outcome", "Subject", "are_curved", "better_of", "inspect_fit", "thinned"]
+__all__ = ["Outcome", "Subject", "are_curved", "better_of", "inspect_fit"]
 
 _BLOCK = 16_384
 """Samples whose products are summed at once: they fit into a processor's cache."""
@@ -58,11 +58,6 @@ class Outcome:
         if self.harmonics is None or not self.named:
             return self.rms
         return max(self.rms, self.named[0].effect)
-
-
-def thinned(x: Real, block: int) -> Real:
-    """Means over blocks of samples; an incomplete last one is omitted."""
-    return np.asarray(x[: x.size // block * block].reshape(-1, block).mean(axis=1))
 
 
 def inspect_fit(subject: Subject, fit: Fit) -> Outcome:

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.noise.whiteness import autocovariance
 from hmpim.identify.worth import MATERIAL, PART
 
 __all__ = ["LineLevel", "detection_lines", "find_period"]
@@ -49,8 +50,7 @@ def find_period(u: Real) -> int | None:
     power = np.concatenate([[0.0], np.cumsum(x**2)])
     if power[-1] == 0:
         return None
-    length = scipy.fft.next_fast_len(2 * n, real=True)
-    product = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, length)) ** 2, length)[: n // 2 + 1]
+    product = n * autocovariance(x, n // 2)
     lag = np.arange(n // 2 + 1)
     both = power[n - lag] + (power[n] - power[lag])
     different = (both - 2 * product) / np.maximum(both, np.finfo(float).tiny)

@@ -42,6 +42,7 @@ from hmpim.model.sampled import prepare_input
 __all__ = [
     "GAPS",
     "KIND_WORDS",
+    "LONGEST",
     "LONGEST_AUTOREGRESSION",
     "RATES",
     "Hypothesis",
@@ -53,6 +54,7 @@ __all__ = [
     "play",
     "rate_limited",
     "stretch_of",
+    "through",
 ]
 
 Kind = Literal[
@@ -94,8 +96,10 @@ _STICKS = 0.01
 LONGEST_AUTOREGRESSION = 10
 """Largest order of the noise model when a trace is tested."""
 
-_LONGEST = 32768
-"""Samples analysed; of a longer record, the stretch with the largest residual."""
+LONGEST = 32768
+"""Samples in which a nonlinearity is sought; of a longer record, those with the largest residual,
+means over blocks, or none where each sample is a step.
+"""
 
 _LAGS = 8
 """Samples by which a linear change of the model may shift its output, either way."""
@@ -267,12 +271,12 @@ def compare_harmonics(
 def stretch_of(residual: Real) -> slice:
     """The stretch to analyse: all, or the part of a long record with the largest residual."""
     n = residual.size
-    if n <= _LONGEST:
+    if n <= LONGEST:
         return slice(0, n)
     power = np.concatenate([[0.0], np.cumsum(residual**2)])
-    starts = np.arange(0, n - _LONGEST + 1, _LONGEST // 8)
-    start = int(starts[np.argmax(power[starts + _LONGEST] - power[starts])])
-    return slice(start, start + _LONGEST)
+    starts = np.arange(0, n - LONGEST + 1, LONGEST // 8)
+    start = int(starts[np.argmax(power[starts + LONGEST] - power[starts])])
+    return slice(start, start + LONGEST)
 
 
 def _background(problem: Problem, fit: Fit, here: slice) -> Real:
@@ -289,6 +293,14 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
+def through(forces: Real, denominator: Real) -> Real:
+    """Responses of dynamics without delay to forces, (k, n), given in the output's unit."""
+    first = forces[:, :1]
+    source = prepare_input(forces - first, "foh")
+    answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
+    return np.asarray(answer + first)
+
+
 def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
     """Every kind with every value to try.
 
@@ -300,13 +312,6 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
 
-    def through(forces: Real) -> Real:
-        """Responses of the dynamics, without delay, to forces given in the output's unit."""
-        first = forces[:, :1]
-        source = prepare_input(forces - first, "foh")
-        answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
-        return np.asarray(answer + first)
-
     share = x / largest
     square = largest * share**2
     cube = square * share
@@ -316,7 +321,7 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator has no restoring force
         direction = np.tanh(step / (_STICKS * fastest))
-        cubic, quadratic, friction = through(np.stack((cube, square, direction)))
+        cubic, quadratic, friction = through(np.stack((cube, square, direction)), denominator)
         yield Hypothesis(kind="hardening", trace=-cubic)
         yield Hypothesis(kind="softening", trace=cubic)
         yield Hypothesis(kind="asymmetry", trace=-quadratic)

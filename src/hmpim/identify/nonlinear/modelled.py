@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import HALF
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -21,7 +20,7 @@ from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.fine import linear_part
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Kind
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Kind
 from hmpim.identify.nonlinear.rows import (
     TURNS,
     Command,
@@ -32,6 +31,7 @@ from hmpim.identify.nonlinear.rows import (
 )
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.digits import plus_minus
+from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.worth import MATERIAL, PART
 from hmpim.record import Finding
 
@@ -48,40 +48,24 @@ __all__ = [
 _FEWEST = 100
 """Samples that must count: many times the parameters of a model with plain dynamics."""
 
-_LONGEST = 32768
-"""Samples up to which it is tried."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Modelled:
-    """A nonlinearity that is part of the model.
-
-    Parameters
-    ----------
-    kind : str
-        Name as in `hmpim.identify.nonlinear.mechanisms`.
-    size, std : float
-        Half of the gap of backlash, or the deflection at which the restoring force equals friction,
-        in the output's unit; half the width of a dead zone in the input's. Otherwise the share by
-        which the force, or the output, at the largest deflection departs from proportion. And its
-        standard deviation.
-    trend : ndarray, shape (n,)
-        Its effect on the output.
-    waits : ndarray of bool, shape (n,), or None
-        Samples that do not depend on the linear part.
-    """
+    """A nonlinearity that is part of the model."""
 
     kind: Kind
+    # Half of the gap of backlash, or the deflection at which the restoring force equals friction,
+    # in the output's unit; half the width of a dead zone in the input's. Otherwise the share by
+    # which the force, or the output, at the largest deflection departs from proportion.
     size: float
-    std: float
-    trend: Real
-    waits: Mask | None
+    std: float  # standard deviation of the size
+    trend: Real  # (n,): its effect on the output
+    waits: Mask | None  # (n,): samples that do not depend on the linear part
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
         unit = units[_UNIT[self.kind]] if self.kind in _UNIT else ""
-        low, high = self.size - HALF * self.std, self.size + HALF * self.std
-        return Estimate(value=self.size, std=self.std, ci95=(low, high), unit=unit)
+        return estimate(self.size, self.std**2, unit=unit)
 
     def as_measured(self, joint: JointFit) -> tuple[Problem, Fit]:
         """The output with the nonlinearity, and the linear part, which leaves it over."""
@@ -102,23 +86,13 @@ def is_explained(joint: JointFit) -> bool:
     """Whether plain dynamics leave white noise, so that no nonlinearity need be sought."""
     fit = joint.best.fit
     plain = fit.structure.name in PLAIN and is_white(joint.problem.counting(fit.residual))
-    return plain or fit.structure.sampled or joint.problem.y.size > _LONGEST
+    return plain or fit.structure.sampled or joint.problem.y.size > LONGEST
 
 
 def kinds_in_question(command: Command, problem: Problem, plain: Fit, best: Fit) -> list[Kind]:
     """Kinds that may explain the residual of a plain fit, the likeliest first.
 
-    Parameters
-    ----------
-    command : Command
-        The input.
-    problem, plain, best
-        The data, the plain fit, and the best linear one.
-
-    Returns
-    -------
-    list of str
-        Empty if the plain fit leaves white noise, or if poles explain what no nonlinearity can.
+    None if the plain fit leaves white noise, or if poles explain what no nonlinearity can.
     """
     if problem.counted < _FEWEST or plain.is_white or best.cost < PART**2 * plain.cost:
         return []
@@ -133,16 +107,7 @@ def settled_rows(
 ) -> Iterator[Nonlinearity]:
     """Rows of a kind, each from a fit of the same structure that agrees with it.
 
-    Parameters
-    ----------
-    kind : str
-        A kind of `kinds_in_question`; others have no row.
-    command : Command
-        The input.
-    problem : Problem
-        The data, without the row.
-    start : Fit
-        A linear fit to them.
+    The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
     """
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)

@@ -11,23 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM, HALF
+from hmpim.identify.arrays import Real, thinned
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit, thinned
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, Mechanism
+from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-from hmpim.identify.result import Estimate, HarmonicCurve, Nonlinearity
+from hmpim.identify.result import HarmonicCurve, Nonlinearity
 from hmpim.identify.result.digits import percent, plus_minus
+from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import MATERIAL, MOST, WORTH
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "inspect_nonlinearity"]
-
-_LONGEST = 32768
-"""Samples up to which a sweep is analysed as it is; longer ones are first averaged in blocks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,9 +72,8 @@ def inspect_nonlinearity(
     >>> found.seen.mechanisms[0].kind, [finding.code for finding in found.findings]
     ('curvature', ['nonlinear'])
     """
-    counted = problem.y if problem.valid is None else problem.y[problem.valid]
-    output = float(np.std(counted))
-    block = -(-u.size // _LONGEST)
+    output = float(np.std(problem.counting(problem.y)))
+    block = -(-u.size // LONGEST)
     sweep = sweep_phase(thinned(u, block), fs / block)
     subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
     outcome = inspect_fit(subject, fit)
@@ -234,15 +231,10 @@ def _summary(
         even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)
     size = None
     if len(named) == 1:
-        found, half = named[0], HALF * named[0].size_std
         units = {"friction": unit, "backlash": unit, "saturation": unit}
         units["rate_limit"] = f"{unit}/s" if unit else "1/s"
-        size = Estimate(
-            value=found.size,
-            std=found.size_std,
-            ci95=(found.size - half, found.size + half),
-            unit=units.get(found.kind, ""),
-        )
+        of_kind = units.get(named[0].kind, "")
+        size = estimate(named[0].size, named[0].size_std ** 2, unit=of_kind)
     return Nonlinearity(
         share=outcome.rms / output if output else 0.0,
         even=even,

@@ -27,9 +27,8 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.nonlinear.fine import FINE, finely, linear_part, linear_part_finely, sampled
-from hmpim.identify.nonlinear.mechanisms import GAPS, Kind, play
+from hmpim.identify.nonlinear.mechanisms import GAPS, Kind, play, through
 from hmpim.identify.worth import MATERIAL, PART
-from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -49,30 +48,14 @@ class Command:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Nonlinearity:
-    """A row for a nonlinearity of size 1.
-
-    Parameters
-    ----------
-    kind : str
-        Name as in `hmpim.identify.nonlinear.mechanisms`.
-    row : ndarray, shape (n,)
-        Its effect on the output.
-    again : callable
-        Makes the row anew from the data with this row and the fit to them.
-    counts : ndarray of bool, shape (n,), or None
-        Samples that depend on the linear part; None if all do.
-    size : float
-        The size for which the row was made.
-    begins : int
-        First sample at which its effect is known: backlash may begin anywhere in its gap.
-    """
+    """A row for a nonlinearity of size 1."""
 
     kind: Kind
-    row: Real
-    again: Callable[[Problem, Fit], "Nonlinearity"]
-    counts: Mask | None = None
-    size: float = 0.0
-    begins: int = 0
+    row: Real  # (n,): its effect on the output
+    again: Callable[[Problem, Fit], "Nonlinearity"]  # from the data with this row, and their fit
+    counts: Mask | None = None  # (n,): samples that depend on the linear part; None if all do
+    size: float = 0.0  # for which the row was made
+    begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
 
 
 def with_row(problem: Problem, one: Nonlinearity) -> Problem:
@@ -87,15 +70,12 @@ def first_rows(
     kind: Kind, command: Command, problem: Problem, start: Fit
 ) -> Iterator[Nonlinearity]:
     """Rows of a kind as the linear fit suggests them."""
+    sizes = [gap * float(np.max(np.abs(linear_part(problem, start)))) for gap in GAPS]
     if kind == "backlash":
-        largest = float(np.max(np.abs(linear_part(problem, start))))
-        tried = [_waiting(problem, start, gap * largest) for gap in GAPS]
-        yield _likeliest(tried, problem, start)
+        yield _likeliest([_waiting(problem, start, size) for size in sizes], problem, start)
     elif kind == "friction" and start.structure.name == "second_order":
         fine = finely(command.u, command.intersample)
-        largest = float(np.max(np.abs(linear_part(problem, start))))
-        tried = [_rubbing(fine, problem, start, gap * largest) for gap in GAPS]
-        yield _likeliest(tried, problem, start)
+        yield _likeliest([_rubbing(fine, problem, start, size) for size in sizes], problem, start)
     elif kind in ("hardening", "softening"):
         yield _forced(kind, problem, start, power=3)
     elif kind == "curvature":
@@ -140,11 +120,12 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | 
 def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     """A dead zone of half a width, of an input on the finer clock."""
     row = -_through_model(sampled(np.clip(fine, -half, half)) / half, problem, fit)
-
-    def again(_: Problem, fit: Fit) -> Nonlinearity:
-        return _dead(fine, problem, fit, abs(float(fit.nuisance[-1])))
-
-    return Nonlinearity(kind="dead_zone", row=row, again=again, size=half)
+    return Nonlinearity(
+        kind="dead_zone",
+        row=row,
+        again=lambda _, fit: _dead(fine, problem, fit, _size_of(fit)),
+        size=half,
+    )
 
 
 def _through_model(u: Real, problem: Problem, fit: Fit) -> Real:
@@ -162,12 +143,13 @@ def _waiting(problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     reached = np.maximum.accumulate(fine) - np.minimum.accumulate(fine) >= 2.0 * half
     begins = int(np.count_nonzero(~reached[::FINE]))
     counts[:begins] = False
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _waiting(data, fit, abs(float(fit.nuisance[-1])))
-
     return Nonlinearity(
-        kind="backlash", again=again, row=moved, counts=counts, size=half, begins=begins
+        kind="backlash",
+        row=moved,
+        again=lambda data, fit: _waiting(data, fit, _size_of(fit)),
+        counts=counts,
+        size=half,
+        begins=begins,
     )
 
 
@@ -187,12 +169,18 @@ def _rubbing(fine: Real, problem: Problem, fit: Fit, force: float) -> Nonlineari
     top, below = scipy.signal.ss2tf(step[:, :2], step[:, 2:], np.eye(1, 2), np.zeros((1, 1)))
     free = scipy.signal.lfilter(top[0], below, np.append(between, command[-1]) - still) + still
     rubbed, moves = _stick_slip(step, between, still, force, inertia)
+    return Nonlinearity(
+        kind="friction",
+        row=((rubbed - free) / force)[::FINE],
+        again=lambda _, fit: _rubbing(fine, problem, fit, _size_of(fit)),
+        counts=moves[::FINE],
+        size=force,
+    )
 
-    def again(_: Problem, fit: Fit) -> Nonlinearity:
-        return _rubbing(fine, problem, fit, abs(float(fit.nuisance[-1])))
 
-    row = ((rubbed - free) / force)[::FINE]
-    return Nonlinearity(kind="friction", row=row, again=again, counts=moves[::FINE], size=force)
+def _size_of(fit: Fit) -> float:
+    """Size of the nonlinearity, whose row is the last."""
+    return abs(float(fit.nuisance[-1]))
 
 
 def _stick_slip(
@@ -234,11 +222,8 @@ def _forced(
     """
     z = linear_part_finely(data, fit)
     z = z if own is None else z + own
-    force = _power(z, power)
-    source = prepare_input(force - force[0], "foh")
     slower = fit.denominator * FINE ** np.arange(fit.denominator.size)
-    seen = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=slower)
-    fine = -(seen + force[0])
+    fine = -through(_power(z, power)[None], slower)[0]
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _forced(kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
@@ -248,11 +233,11 @@ def _forced(
 
 def _scaled(kind: Kind, data: Problem, fit: Fit, *, power: int) -> Nonlinearity:
     """A scale that changes with the deflection."""
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _scaled(kind, data, fit, power=power)
-
-    return Nonlinearity(kind=kind, row=_power(linear_part(data, fit), power), again=again)
+    return Nonlinearity(
+        kind=kind,
+        row=_power(linear_part(data, fit), power),
+        again=lambda data, fit: _scaled(kind, data, fit, power=power),
+    )
 
 
 def _power(x: Real, power: int) -> Real:

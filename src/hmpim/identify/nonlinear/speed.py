@@ -21,16 +21,13 @@ from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.fine import FINE, finely, sampled
-from hmpim.identify.nonlinear.mechanisms import LONGEST_AUTOREGRESSION, RATES, rate_limited
+from hmpim.identify.nonlinear.mechanisms import LONGEST, LONGEST_AUTOREGRESSION, RATES, rate_limited
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import PART, TWICE
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Finding, Intersample
 
 __all__ = ["LimitedCommand", "explains_more", "limited_command", "speed_finding", "with_free_speed"]
-
-_LONGEST = 32768
-"""Longest record tested, in samples: ramps are computed step by step."""
 
 _STEP = 0.01
 """Step in the speed for its curvature, over the greatest speed of the command."""
@@ -68,7 +65,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     best, problem = joint.best, joint.problem
     known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)
     plain = [trial for trial in joint.trials if trial.fit.structure.name in PLAIN]
-    if known or not plain or u.size > _LONGEST or best.fit.structure.sampled:
+    if known or not plain or u.size > LONGEST or best.fit.structure.sampled:
         return None
     start = min(plain, key=lambda trial: trial.criterion)
     if best.fit.cost < PART**2 * start.fit.cost:

@@ -33,9 +33,8 @@ The distance of crossings then exceeds the rounding of times in a record of 10^8
 class SweepPhase:
     """Instantaneous phase of a sweep, all of shape (n,)."""
 
-    phase: Real  # rad; the input is about centre + amplitude * cos(phase)
+    phase: Real  # rad; the input is about its centre plus a multiple of cos(phase)
     frequency: Real  # Hz
-    amplitude: Real  # in the input's unit
     inside: Mask  # samples during the sweep itself
 
 
@@ -75,7 +74,6 @@ def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
     return SweepPhase(
         phase=phase,
         frequency=np.gradient(phase) * fs / (2 * np.pi),
-        amplitude=envelope,
         inside=inside,
     )
 

@@ -22,7 +22,8 @@ import scipy
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.result import Identification, PairIdentification
-from hmpim.model import Model, simulate
+from hmpim.model import Model, coefficient_vector, simulate
+from hmpim.model.draws import with_coefficients
 from hmpim.record import Aligned, Channel, Finding, Record, Signal, Waveform, fit_clock, on_grid
 
 __all__ = ["settled_between"]
@@ -158,54 +159,34 @@ def _refined(
     models: list[Model], waveforms: list[Waveform], channel: Channel, counted: Mask
 ) -> list[Model]:
     """Refine the models to explain an output best, with the true waveforms."""
-    if not np.all([c > 0.0 for model in models for c in _moved_coefficients(model)]):
+    parts = [coefficient_vector(model) for model in models]
+    poles = [slice(1 + len(model.numerator), None) for model in models]
+    if not all(np.all(part[at] > 0.0) for part, at in zip(parts, poles, strict=True)):
         return models  # no logarithm exists
-    parts = [_vector(model) for model in models]
+    for part, at in zip(parts, poles, strict=True):
+        part[at] = np.log(part[at])
     cuts = np.cumsum([part.size for part in parts])[:-1]
     begun = np.concatenate(parts)
     hopeless = np.full(np.count_nonzero(counted), _HOPELESS * float(np.ptp(channel.values)))
 
     def made(x: Real) -> list[Model]:
-        return [_made(model, part) for model, part in zip(models, np.split(x, cuts), strict=True)]
+        moved = np.split(x.copy(), cuts)
+        for part, at in zip(moved, poles, strict=True):
+            part[at] = np.exp(part[at])
+        return [with_coefficients(*each) for each in zip(models, moved, strict=True)]
 
     def error(x: Real) -> Real:
         try:
             predicted = _responses(made(x), waveforms, channel.time)
-        except ArgumentError:  # not stable
+        except ArgumentError:  # no stable model
             return hopeless
         rest = (channel.values - predicted)[counted]
         return np.asarray(rest - rest.mean())
 
     scale = np.where(np.abs(begun) > 0.0, np.abs(begun), 1.0)
-    for part, model, cut in zip(parts, models, [0, *cuts], strict=True):
-        scale[cut] = max(abs(model.delay), 1.0 / waveforms[0].fs)
-        scale[cut + part.size - len(_moved_coefficients(model)) : cut + part.size] = 1.0
+    for own, model, at in zip(np.split(scale, cuts), models, poles, strict=True):
+        own[0], own[at] = max(abs(model.delay), 1.0 / waveforms[0].fs), 1.0
     done = scipy.optimize.least_squares(
         error, begun, x_scale=scale, diff_step=np.full(begun.size, _APART), max_nfev=_STEPS
     )
     return made(np.asarray(done.x))
-
-
-def _moved_coefficients(model: Model) -> tuple[float, ...]:
-    """Coefficients of the denominator but the last: it is 1, or 0 with an integrator."""
-    return model.denominator[: -1 if model.denominator[-1] else -2]
-
-
-def _vector(model: Model) -> Real:
-    """Delay, numerator with scale factor, and logarithms of the free denominator coefficients."""
-    numerator = model.scale_factor * np.asarray(model.numerator)
-    return np.concatenate([[model.delay], numerator, np.log(_moved_coefficients(model))])
-
-
-def _made(model: Model, vector: Real) -> Model:
-    """Model with the parameters of such a vector."""
-    zeros = len(model.numerator)
-    moved = np.exp(vector[1 + zeros :])
-    fixed = model.denominator[moved.size :]
-    return replace(
-        model,
-        delay=float(vector[0]),
-        scale_factor=1.0,
-        numerator=tuple(vector[1 : 1 + zeros].tolist()),
-        denominator=(*moved.tolist(), *fixed),
-    )

@@ -27,13 +27,12 @@ def checked_intersample(intersample: str, stated: Intersample | None) -> Intersa
     """Return what the input does between its samples; None if that is to be found."""
     if intersample == "auto":
         return stated
-    for known in get_args(Intersample):
-        if intersample == known:
-            return cast(Intersample, known)
-    raise ArgumentError(
-        f"intersample {intersample!r} is not known; choose one of auto, zoh, foh, bandlimited, "
-        "sampled"
-    )
+    if intersample not in get_args(Intersample):
+        raise ArgumentError(
+            f"intersample {intersample!r} is not known; choose one of auto, zoh, foh, "
+            "bandlimited, sampled"
+        )
+    return cast(Intersample, intersample)
 
 
 def checked_structures(

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, thinned
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
@@ -127,9 +127,7 @@ def _thinned(u: Real, y: Real, valid: Mask) -> tuple[Real, Real, Mask]:
     highest = float(frequency[np.searchsorted(total, 0.95 * total[-1])])
     block = int(_BAND / highest) if highest > 0.0 else u.size
     block = max(1, min(block, u.size // (2 * _FEWEST)))
-    whole = u.size // block * block
-    u, y = (x[:whole].reshape(-1, block).mean(axis=1) for x in (u, y))
-    return u, y, np.asarray(valid[:whole].reshape(-1, block).all(axis=1))
+    return thinned(u, block), thinned(y, block), thinned(valid.astype(np.float64), block) == 1.0
 
 
 def _evidence(u: Real, y: Real, valid: Mask, step: int, *, lead: int = 0) -> float:

@@ -2,7 +2,6 @@
 
 readings          every parameter of a fit, and their covariance
 figures           figures of a vector of fitted parameters, with their errors
-propagation       propagation of the covariance to figures
 candidates        every structure that was tried
 coefficients      coefficients of a system, as in results
 spanned           intervals that cover every model that the record allows

@@ -3,9 +3,8 @@
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.result.powers import by_falling_powers
 from hmpim.model.filters import in_z
-from hmpim.model.response import RationalDelay
+from hmpim.model.response import RationalDelay, by_falling_powers
 
 __all__ = ["coefficients_of", "highest_first"]
 

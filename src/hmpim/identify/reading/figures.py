@@ -1,10 +1,11 @@
 """Figures of a system, each with its error bar from the covariance of the fit."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.reading.propagation import gradient, log_slopes
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import FIXED_UNITS
@@ -16,12 +17,13 @@ from hmpim.model.response import (
     bandwidth_3db,
     bandwidth_phase,
     dominant_time_constant,
+    log_slopes,
     peak_gain,
     response,
 )
 from hmpim.units import quotient_unit
 
-__all__ = ["figures_at", "figures_of", "read_figures", "system_of", "units_of"]
+__all__ = ["figures_at", "figures_of", "gradient", "read_figures", "system_of", "units_of"]
 
 
 def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
@@ -135,6 +137,17 @@ def _slopes(
             lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), vector
         )
     return slopes
+
+
+def gradient(function: Callable[[Real], float] | Callable[[Real], Real], at: Real) -> Real:
+    """Derivatives by central differences, shape (p,), or (p, q) of a function of q values."""
+    out = []
+    for i, step in enumerate(1e-6 * np.maximum(np.abs(at), 1e-3)):
+        up, down = at.copy(), at.copy()
+        up[i] += step
+        down[i] -= step
+        out.append((function(up) - function(down)) / (2 * step))
+    return np.array(out)
 
 
 def figures_of(fit: Fit, *, fs: float, highest: float) -> dict[str, float | None]:

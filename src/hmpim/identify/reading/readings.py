@@ -14,8 +14,7 @@ from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
 from hmpim.identify.noise.level import steadiness
 from hmpim.identify.noise.whiteness import is_steady, is_white
-from hmpim.identify.reading.figures import read_figures
-from hmpim.identify.reading.propagation import gradient
+from hmpim.identify.reading.figures import gradient, read_figures
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.model.response import RationalDelay
@@ -29,39 +28,18 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Readings:
-    """The parameters of a fit, its system, and their covariance.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        The estimates.
-    system : RationalDelay
-        In seconds, the scale factor included.
-    vector : ndarray, shape (p,)
-        Delay and denominator sections, both in samples; numerator; bias.
-    covariance : ndarray, shape (p, p)
-        Of `vector`.
-    white : bool
-        Whether the residual is white.
-    halves : ndarray, shape (2, p + 1, p + 1)
-        Products of the derivatives of the prediction and `innovations` over either half of the
-        record, from `hmpim.identify.fitting.fit.products`.
-    innovations : ndarray, shape (n,)
-        The residual, whitened.
-    whitened : bool
-        Whether `innovations` are white.
-    coefficient_covariance : ndarray, shape (q, q)
-        Of the delay and the coefficients of `system` that may vary, by rising powers of s.
-    """
+    """The parameters of a fit, its system, and their covariance."""
 
     parameters: Parameters
-    system: RationalDelay
-    vector: Real
-    covariance: Real
-    white: bool
+    system: RationalDelay  # in seconds, the scale factor included
+    vector: Real  # (p,): delay and denominator sections, both in samples; numerator; bias
+    covariance: Real  # (p, p): of `vector`
+    white: bool  # whether the residual is white
+    # (2, p + 1, p + 1): products of the derivatives of the prediction and `innovations` over either
+    # half of the record, from `hmpim.identify.fitting.derivatives.products`
     halves: Real
-    innovations: Real
-    whitened: bool
+    innovations: Real  # (n,): the residual, whitened
+    # (q, q): of the delay and the coefficients of `system` that may vary, by rising powers of s
     coefficient_covariance: Real
 
     def variance(self, function: Callable[[Real], float]) -> float:
@@ -135,7 +113,6 @@ def read_parameters(
         white=white and not weighed.is_coloured,
         halves=halves,
         innovations=residual,
-        whitened=white,
         coefficient_covariance=coefficients,
     )
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hmpim.identify.result.powers import by_falling_powers
+from hmpim.model.response import by_falling_powers
 
 __all__ = ["FIRST_SCHEMA", "upgraded"]
 

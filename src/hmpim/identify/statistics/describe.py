@@ -26,7 +26,6 @@ from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.reading.candidates import candidates_of
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
-from hmpim.identify.reading.propagation import response_std
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned, without_noise
 from hmpim.identify.result import (
@@ -48,7 +47,7 @@ from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.model.dynamics import StructureName
-from hmpim.model.response import response, slowest_time_constant
+from hmpim.model.response import response, response_std, slowest_time_constant
 from hmpim.record import Finding, Intersample
 
 __all__ = ["identify_statistics"]
@@ -177,7 +176,6 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
         white=best.is_white,
         halves=np.zeros((2, 0, 0)),
         innovations=np.empty(0),
-        whitened=True,
         coefficient_covariance=spread,
     )
 
@@ -299,7 +297,13 @@ def _unrelated(statistics: Statistics, data: CompressedData, joint: JointFit) ->
                 variance * best.moments.bias_variance,
                 freedom=products.counted - 1,
                 unit=statistics.units[1],
-            )
+            ),
+            noise_std=noise_estimate(
+                products.plain.energy,
+                freedom=max(products.plain.counted - 1, 1),
+                share=1.0,
+                unit=statistics.units[1],
+            ),
         ),
         paper=PaperEstimates(),
         frequency_response=FrequencyResponse(

@@ -9,10 +9,10 @@ from hmpim.arguments import numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Real
 from hmpim.identify.reading.bandwidth import ratio_at
-from hmpim.identify.reading.propagation import log_slopes
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.result.error_bars import estimate
 from hmpim.model import Model, RationalDelay, phase, response
+from hmpim.model.response import log_slopes
 
 __all__ = ["GainPhase", "gain_and_phase", "measurable"]
 
