@@ -241,7 +241,8 @@ def find_beginning(course: Course) -> Course:
         settled = polished(course.problem, course.best)
         fits = [settled if fit is course.best else fit for fit in fits]
     counted = count_in(data, natural, fits, seen, course.known)
-    if counted.begins is None and settled is None and in_motion(data.u):
+    poor = is_poor(course.best, course.problem.spread)
+    if counted.begins is None and poor and in_motion(data.u):
         counted = _in_motion(course) or counted
     if counted.begins is not None:  # fits that assumed rest may have ended anywhere
         problem = data.problem(natural, counted)
