@@ -183,8 +183,7 @@ class _WithRows:
         kept = replace(steady, drifting=drifting, humming=humming, asked=self.asked)
         if self.several:
             return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
-        prediction = None if drifting is None else self.first.prediction
-        return replace(kept, fits=(joint,), steady=prediction)
+        return replace(kept, fits=(joint,))
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""

@@ -62,7 +62,6 @@ class OutputFit:
     drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
     asked: int = 0  # the input with which the drift was fitted
     humming: Humming | None = None  # mains hum; each fit's output is without it
-    steady: Real | None = None  # (n,): with a drift, the prediction of a fit with a constant bias
     gaining: GainChange | None = None  # a gain that changes, with one input only
     bending: Modelled | None = None  # a nonlinearity that the model includes, with one input only
 
