@@ -14,11 +14,10 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER
+from hmpim.identify.chance import FALSE_ALARM, LIKELIER
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
-from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -85,8 +84,7 @@ def with_drift(
 
     def gained(joint: JointFit) -> float | None:
         gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
-        least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
-        return None if gain < least else gain
+        return None if gain < 0.0 else gain
 
     gain = gained(joint)  # fewer rows explain no more
     if gain is not None and len(columns) < len(every):  # choose again, with the drift known
@@ -153,17 +151,6 @@ def _unless_steady(
         rival=rival,
     )
     return drifting.joint, drifting
-
-
-def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
-    """Whether a rich model has a pole as slow as the record, and plain dynamics with a drift do.
-
-    If both explain the record, gain and bandwidths are right only with the drift.
-    """
-    fit, plain = first.best.fit, drifting.best.fit
-    slow = spans_record(fit) and drifting.problem.counted >= _FEWEST  # fewer have no shape
-    rich = fit.structure.parameters > plain.structure.parameters
-    return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
 
 
 def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> tuple[Finding, ...]:
