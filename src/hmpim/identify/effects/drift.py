@@ -14,7 +14,7 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM, LIKELIER
+from hmpim.identify.chance import LIKELIER
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
@@ -22,7 +22,6 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import MOST, PART, TWICE
@@ -198,9 +197,7 @@ def is_slow(problem: Problem, fit: Fit) -> bool:
         return False
     # In 1/f noise, polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4
-    if _steepness(residual) > TWICE**2 * flicker:
-        return True
-    return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
+    return _steepness(residual) > TWICE**2 * flicker
 
 
 def _steepness(residual: Real) -> float:
