@@ -29,9 +29,9 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Fits, follows, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
     HiddenPole,
@@ -43,7 +43,6 @@ from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
 from hmpim.identify.fitting.whitening import is_contradicted, refit_whitened, weighed_by_noise
-from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -153,7 +152,7 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known)
         bandlimited = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if bandlimited else None
-        if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
+        if (again, finer) == (None, None):
             break
         again = again or seen
         course = replace(course, counted=again, data=(finer or course).data.plain)
@@ -163,18 +162,6 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
-
-
-def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
-    """Whether the fit leaves white noise if it is refitted without a noise colour.
-
-    If earlier fits were unfinished, the colour may be that of a mode, and hide the mode's free
-    response.
-    """
-    if not problem.is_coloured or problem.begins is None:
-        return False
-    plain = problem.plain
-    return is_white(plain.counting(refit(plain, fit).residual))
 
 
 def ask_for_poles(
