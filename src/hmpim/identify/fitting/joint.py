@@ -16,7 +16,6 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import look_again
 from hmpim.identify.fitting.between import refit_between
-from hmpim.identify.fitting.candidates import pruned
 from hmpim.identify.fitting.course import (
     Course,
     continue_between,
@@ -194,32 +193,22 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
         if other.grown and other.grown[-1].criterion < leading.criterion:
             growth, leading = other, other.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    return joint if leading is joint.best else _with_leading(leading, joint, course, structures)
+    return joint if leading is joint.best else _with_leading(leading, joint, course)
 
 
-def _with_leading(
-    leading: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> JointFit:
-    """The joint fit with a grown trial as the best, polished and under each assumption.
-
-    The added pole may lead to new starts for plainer structures, one of which may be better still.
-    """
+def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
+    """The joint fit with a grown trial as the best, polished and under each assumption."""
     mode = leading.intersample
     problem = course.data.problem(mode, course.counted)
     count = problem.counted * joint.weighed_share
-    fits = [t.fit for t in joint.trials if t.intersample == mode]
-    plainer = [trial_of(mode, fit, count) for fit in pruned(problem, fits, structures)]
-    chosen = min([leading, *plainer], key=lambda trial: trial.criterion)
-    fit = polished(problem, chosen.fit)
-    trials = [trial for trial in joint.trials if trial is not chosen]
+    fit = polished(problem, leading.fit)
+    trials = [trial for trial in joint.trials if trial is not leading]
     for other in () if course.alone else BETWEEN:
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
             trials.append(trial_of(other, moved, count))
     best = trial_of(mode, fit, count)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
-    if chosen is not leading:  # it was not tested for one more pole
-        return fresh
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 
 
