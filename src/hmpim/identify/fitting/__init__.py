@@ -14,7 +14,6 @@ whitening       the noise of all trials, and whether whitening may be trusted
 trial           all trials, and the choice among them
 plainer         plain structures next to a rich one
 washout         a washout in place of a drift
-nested          one pole or two: error bars that admit both
 unrelated       whether an output follows its input at all
 halves          whether the halves of a record agree
 """
