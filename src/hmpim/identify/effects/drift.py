@@ -96,7 +96,7 @@ def with_drift(
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily
+    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily = lambda _: None
 ) -> tuple[JointFit, Drifting | None] | None:
     """Add a drift to plain dynamics; keep it if that leaves white noise.
 

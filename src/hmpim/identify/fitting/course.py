@@ -23,7 +23,6 @@ from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.start import rough_response
-from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -40,7 +39,6 @@ __all__ = [
     "continued",
     "enrich",
     "find_beginning",
-    "fit_in_motion",
     "free_from_wander",
     "is_unanswered",
     "looks_held",
@@ -292,30 +290,6 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
-
-
-def fit_in_motion(course: Course, fit: Fit) -> Course | None:
-    """Fit from mid-motion; None unless that leaves white noise.
-
-    Parameters
-    ----------
-    course : Course
-        The plain fits so far.
-    fit : Fit
-        Of any structure, from a problem with nuisance rows. The drift in them may be the fit's
-        free response, or that of a washout.
-    """
-    data, given = course.data, course.given
-    counted = begin_at(given, max(int(np.ceil(fit.delay)), 0) + REACH, data.y.size)
-    if counted is None or fit.structure.integrators:
-        return None
-    problem = data.problem(course.natural, counted)
-    free: Fit | None = refit(problem, fit) if fit.structure.order else None
-    if free is None or not free.is_white:
-        free = washed_out(problem, fit)
-    if free is None or not free.is_white:
-        return None
-    return replace(course, others=(), counted=counted, fits=[free], settled=None)
 
 
 def continue_between(course: Course) -> Fits:
