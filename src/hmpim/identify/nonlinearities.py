@@ -16,7 +16,7 @@ from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
 from hmpim.identify.noise.input_noise import input_noise
-from hmpim.identify.nonlinear.bends import Bend, bends, plainer_bends
+from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.modelled import (
     described,
     is_explained,
@@ -139,7 +139,10 @@ def looked_through(
         return joint, inspection, unseen
     if inspection is not None and inspection.fit is not joint.best.fit:
         return taking(joint, inspection.fit), inspection, unseen
-    return joint, inspection, unseen
+    if plain is None:
+        return joint, inspection, unseen
+    bent_instead, untried = attempt("bends", lambda: _is_bent(question, found, joint, plain), False)
+    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
 
 
 def _inspected(
@@ -173,6 +176,21 @@ def _inspected(
 def _floor(question: Question, found: Imperfections) -> float:
     """R.m.s. of the rounding error, by the steps of the output or of the arithmetic."""
     return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
+
+
+def _is_bent(question: Question, found: Imperfections, joint: JointFit, plain: Fit) -> bool:
+    """Whether a plain fit and a nonlinearity replace a rich one; not tested in a loop."""
+    if question.instrument is not None or joint.best.fit.structure.sampled:
+        return False
+    return is_bent_instead(
+        question.aligned.inputs[0].values,
+        joint.problem,
+        joint.best.fit,
+        plain,
+        intersample=joint.best.intersample,
+        fs=question.aligned.fs,
+        floor=_floor(question, found),
+    )
 
 
 def possible_bends(
