@@ -41,7 +41,7 @@ from hmpim.identify.fitting.growth import (
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
-from hmpim.identify.fitting.whitening import is_contradicted, refit_whitened, weighed_by_noise
+from hmpim.identify.fitting.whitening import refit_whitened, weighed_by_noise
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -120,7 +120,7 @@ def chosen_of(
     course, fitted = enrich(course, fitted)
     course, trials, best, share = weigh_and_look_again(course, fitted)
     joint = settle(course, trials, best, share)
-    return ask_for_poles(joint, course, structures) if growing else joint
+    return grow_poles(joint, course, structures) if growing else joint
 
 
 def settle(
@@ -161,22 +161,6 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
-
-
-def ask_for_poles(
-    joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> JointFit:
-    """Add poles, again without noise colour if the richer fit contradicts it."""
-    grown, data = grow_poles(joint, course, structures), course.data
-    if grown.best is joint.best or data.noise is None:
-        return grown
-    if not is_contradicted(data, grown.best, course.counted):
-        return grown
-    course = replace(course, data=data.plain)
-    fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
-    share = joint.effective_share
-    trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
-    return grow_poles(settle(course, trials, best, share), course, structures)
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
@@ -280,9 +264,6 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
         course = replace(course, data=weighed)
         fitted = refit_whitened(course.data, fitted, seen)
     trials, best = _decide(course, fitted, share)
-    if weighed.noise is not None and is_contradicted(course.data, best, seen):
-        course = replace(course, data=data.plain)
-        trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
     return course, trials, best, share
 
 
