@@ -156,8 +156,7 @@ def fit_together(
         if others or clearer:
             _fit_couplings(inputs, pairs, plain)
             pairs.refine(pairs.kept, None)
-        simpler = pairs.simplify()
-        if not others and not simpler and pairs.cost * TWICE > cost:
+        if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
     if pairs.reopen():
         _fit_strong(inputs, pairs, partial(fitted, structures=structures))
