@@ -158,10 +158,6 @@ def fit_together(
             pairs.refine(pairs.kept, None)
         if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
-    if pairs.reopen():
-        _fit_strong(inputs, pairs, partial(fitted, structures=structures))
-        _fit_couplings(inputs, pairs, plain)
-        pairs.refine(pairs.kept, None)
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)

@@ -10,7 +10,6 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.growth import FEW_POLES
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, PART, TWICE
@@ -84,14 +83,6 @@ class Pairs:
         if before[1] is None or counted is None:
             return before[1] is not counted
         return not np.array_equal(before[1], counted)
-
-    def reopen(self) -> bool:
-        """Forget the searches' data if a fit of many poles is not white; return whether one is."""
-        best = [self.fits[i].best.fit for i in self.strong]
-        unsure = any(fit.structure.order > FEW_POLES and not fit.is_white for fit in best)
-        if unsure:
-            self._searched.clear()
-        return unsure
 
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which the contributions of some inputs are known."""
