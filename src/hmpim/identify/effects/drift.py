@@ -197,7 +197,7 @@ def is_slow(problem: Problem, fit: Fit) -> bool:
         return False
     # In 1/f noise, polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4
-    return _steepness(residual) > TWICE**2 * flicker
+    return bool(_steepness(residual) > TWICE**2 * flicker)
 
 
 def _steepness(residual: Real) -> float:
