@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.output_fit import OutputFit, fit_together
-from hmpim.identify.coupling.output_fit import fit_in_motion as fit_all_in_motion
+from hmpim.identify.coupling.output_fit import OutputFit, fit_in_motion, fit_together
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
@@ -18,13 +17,11 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,
     continued,
-    fit_in_motion,
     free_from_wander,
     start,
     turn_ahead,
@@ -111,11 +108,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
 
-    def steadily(drifted: JointFit) -> JointFit | None:
-        free = fit_in_motion(former, drifted.best.fit)
-        return None if free is None else chosen_of(free, question.structures)
-
-    found = with_plain_drift(former.problem, former.best, with_rows, steadily)
+    found = with_plain_drift(former.problem, former.best, with_rows)
     if found is None or not found[0].related:
         return None
     joint, drifting = found
@@ -136,7 +129,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or sampled:
         return fitted
-    return _WithRows(question, seen, fitted, begun).found()
+    return _WithRows(question, seen, fitted).found()
 
 
 class _WithRows:
@@ -146,10 +139,8 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(
-        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
-    ) -> None:
-        self.question, self.seen, self.first, self.begun = question, seen, fitted, begun
+    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
+        self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
         self.asked = fitted.leading if slow is None else slow
@@ -171,9 +162,6 @@ class _WithRows:
         unrelated = {i: fit for i, fit in enumerate(steady.fits) if not fit.related}
         self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
         joint, drifting = with_drift(before, self.with_rows, self.steadily)
-        if self.unrelated and drifting is not None:
-            self.unrelated = {}
-            joint, drifting = with_drift(before, self.with_rows, self.steadily)
         humming = self.humming
         if drifting is not None:
             steady = self.latest
@@ -183,17 +171,14 @@ class _WithRows:
         kept = replace(steady, drifting=drifting, humming=humming, asked=self.asked)
         if self.several:
             return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
-        prediction = None if drifting is None else self.first.prediction
-        return replace(kept, fits=(joint,), steady=prediction)
+        return replace(kept, fits=(joint,))
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        question, before = self.question, self.latest
+        question = self.question
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = fit_once(question, self.seen, names, every, excluded=self.unrelated)
-        if not self.several and not plainly and before is not self.first:
-            self.latest = _as_before(question, self.seen, every, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -201,35 +186,13 @@ class _WithRows:
         self.hum = found.problem.y - quiet.problem.y
         return quiet
 
-    def steadily(self, drifted: JointFit) -> JointFit | None:
-        """The same dynamics with a constant bias, from a state that is free."""
-        question = self.question
-        if question.intersample == "sampled":
+    def steadily(self, _: JointFit) -> JointFit | None:
+        """The same dynamics of several inputs with a constant bias, from a state that is free."""
+        if not self.several:
             return None
         hum = None if self.humming is None else self.humming.rows
-        if self.several:
-            self.freed = _all_free(question, self.latest, self.asked, hum)
-            return None if self.freed is None else self.freed.fits[self.asked]
-        course = self.begun or started(question, self.seen, hum)
-        free = fit_in_motion(course, drifted.best.fit)
-        return None if free is None else chosen_of(free, question.structures)
-
-
-def _as_before(
-    question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
-) -> OutputFit:
-    """The fit that a search with `rows` found, or the plainer dynamics found before if likelier.
-
-    A search may end in a large number of modes.
-    """
-    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
-    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
-        return found
-    course = completed(turn_ahead(started(question, seen, rows)))
-    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
-    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
-    return OutputFit(fits=(joint,)) if gain > 0.0 else found
+        self.freed = _all_free(self.question, self.latest, self.asked, hum)
+        return None if self.freed is None else self.freed.fits[self.asked]
 
 
 def _plain_beside_drift(
@@ -274,7 +237,7 @@ def _all_free(
 ) -> OutputFit | None:
     """Fits of several inputs with a constant bias, from a state that is free."""
     u = [source.values for source in question.aligned.inputs]
-    return fit_all_in_motion(fitted, u, question.output.values, asked, rows)
+    return fit_in_motion(fitted, u, question.output.values, asked, rows)
 
 
 @kept

@@ -28,7 +28,6 @@ from hmpim.identify.result import Identification, RecordSummary
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.steps import (
-    drift_or_levels,
     let_gain_change,
     look,
     look_again,
@@ -171,7 +170,6 @@ def identify_output(question: Question) -> Described:
     question = recognise_software(mark_swapped(question))
     seen = look(question)
     seen, fitted = fit(question, seen)
-    seen, fitted = drift_or_levels(question, seen, fitted)
     for _ in range(LOOKS):
         before, seen = seen, look_again(question, seen, fitted)
         if not seen.counts_other_samples_than(before):

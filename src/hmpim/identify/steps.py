@@ -8,10 +8,7 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.gain import changing_gain
-from hmpim.identify.effects.imperfections import (
-    Imperfections,
-    refine,
-)
+from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.effects.lost_samples import stand_out
 from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.effects.saturation import goes_beyond
@@ -27,7 +24,6 @@ from hmpim.identify.preparation.reference import fit_through
 from hmpim.identify.preparation.swapped import is_swapped, lags_behind, swapped_finding
 
 __all__ = [
-    "drift_or_levels",
     "let_gain_change",
     "look",
     "look_again",
@@ -55,26 +51,6 @@ def mark_swapped(question: Question) -> Question:
         return question  # the clock is late
     finding = swapped_finding(source.name, output.name)
     return replace(question, structures=question.plain, swapped=finding)
-
-
-def drift_or_levels(
-    question: Question, seen: Imperfections, fitted: OutputFit
-) -> tuple[Imperfections, OutputFit]:
-    """Replace a drift by saturation levels after the noise if they explain the output better."""
-    if fitted.steady is None or seen.saturation is not None:
-        return seen, fitted
-    plateau = imperfections_of(question, prediction=fitted.steady).saturation
-    if plateau is None or plateau.noise != "after":
-        return seen, fitted
-    clipped = replace(seen, saturation=plateau)
-    levelled = fit_once(question, clipped, question.structures)
-    u = question.aligned.inputs[0].values
-    refined = refine(levelled.fits[0], clipped, u, question.aligned.fs)
-    (drifted,) = fitted.fits
-    variance = drifted.best.fit.cost / drifted.problem.counted
-    if refined is None or refined[1].noise_std ** 2 > variance:
-        return seen, fitted
-    return clipped, levelled
 
 
 def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:

@@ -8,13 +8,12 @@ import pytest
 import hmpim
 from hmpim.identify.fitting.course import (
     find_beginning,
-    fit_in_motion,
     free_from_wander,
     looks_held,
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, RICH
+from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.model.dynamics import STRUCTURES
 
@@ -63,17 +62,3 @@ def test_what_an_integrator_does_is_neither_ahead_of_its_input_nor_wander(first,
     assert course.data.rough.ahead is not None  # it looks like it
     assert turn_ahead(course) is course
     assert free_from_wander(course) is course
-
-
-def test_dynamics_set_free_are_weighed_as_they_are_and_not_enriched():
-    """A richer search starts from plain dynamics; beside a drift the best may be four modes."""
-    rng = np.random.default_rng(3)
-    u = np.convolve(rng.standard_normal(1500), np.ones(8) / 8, "same")
-    y = np.convolve(u, 0.1 * np.exp(-0.1 * np.arange(200)))[: u.size] + u
-    y = y + 1e-3 * rng.standard_normal(u.size)
-    course = start(u[300:], y[300:], None, None, "bandlimited", (*PLAIN, *RICH), None)
-    structure = STRUCTURES["first_order_zero"]
-    fit = fit_structure(course.problem, structure, np.array([0.0, np.log(10.0)]))
-    free = fit_in_motion(course, fit)
-    assert free is not None
-    assert (free.others, free.best.structure) == ((), structure)

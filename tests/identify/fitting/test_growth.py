@@ -145,20 +145,6 @@ def test_a_pole_that_would_not_show_takes_its_time_from_the_delay(u):
     assert longest.delay < joint.best.fit.delay - 0.5 * joint.hidden.limit
 
 
-def test_a_colour_that_the_grown_fit_contradicts_is_not_weighed_by(u, monkeypatch):
-    clean = answer(u, RESONANT, (4.0,))
-    colour = scipy.signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(4).standard_normal(N))
-    y = clean + 0.01 * colour
-    names = ("second_order", "third_order")
-    weighed = fitted(u, y, *names)
-    assert weighed.best.fit.structure.name == "third_order"
-    assert weighed.weighed.noise is not None
-    monkeypatch.setattr(
-        joint, "is_contradicted", lambda data, best, seen: best.fit.structure.order > 2
-    )
-    assert fitted(u, y, *names).weighed.noise is None
-
-
 def test_noise_that_is_slow_does_not_hide_a_fast_pole(u):
     """What counts is how many samples the pole's own response sees, not all that is left over."""
     slow = scipy.signal.lfilter([1.0], [1.0, -0.995], np.random.default_rng(4).standard_normal(N))

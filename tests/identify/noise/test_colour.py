@@ -1,12 +1,11 @@
-"""Colour of the noise, drift of the bias, noise on the input: right and rightly uncertain."""
+"""Colour of the noise, and noise on the input: right and rightly uncertain."""
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hmpim.identify.noise.colour import bias_drift, noise_colour
+from hmpim.identify.noise.colour import noise_colour
 from hmpim.identify.noise.input_noise import input_noise
-from tests_support import assert_share
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -55,22 +54,6 @@ def test_a_line_is_found_and_taken_out_of_the_colour():
         assert found.kind == "white"
         assert "60" in found.description
         assert noise_colour(noise, FS).line_frequency is None
-
-
-@pytest.mark.parametrize("coefficient", [0.0, 0.9])
-def test_the_drift_scatters_as_stated(coefficient):
-    errors, chances = [], []
-    for seed in range(150):
-        found = bias_drift(0.03 * T + autoregressive(coefficient, seed), T)
-        errors.append((found.slope - 0.03) / found.std)
-        chances.append(bias_drift(autoregressive(coefficient, seed), T).probability)
-    assert abs(np.mean(errors)) < 0.3
-    assert 0.85 < np.std(errors) < 1.2
-    assert_share(np.array(chances) < 0.05, at_most=0.06)
-
-
-def test_flicker_noise_is_not_taken_for_drift():
-    assert min(bias_drift(flicker(seed), T).probability for seed in range(100)) > 1e-4
 
 
 def test_the_noise_of_the_input_and_what_it_costs():

@@ -23,7 +23,7 @@ from hmpim.identify.coupling.joint_errors import common, covariances, derivative
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
-from hmpim.identify.effects.drift import Drifting, drift_rows
+from hmpim.identify.effects.drift import Drifting
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
@@ -62,7 +62,6 @@ class OutputFit:
     drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
     asked: int = 0  # the input with which the drift was fitted
     humming: Humming | None = None  # mains hum; each fit's output is without it
-    steady: Real | None = None  # (n,): with a drift, the prediction of a fit with a constant bias
     gaining: GainChange | None = None  # a gain that changes, with one input only
     bending: Modelled | None = None  # a nonlinearity that the model includes, with one input only
 
@@ -157,13 +156,8 @@ def fit_together(
         if others or clearer:
             _fit_couplings(inputs, pairs, plain)
             pairs.refine(pairs.kept, None)
-        simpler = pairs.simplify()
-        if not others and not simpler and pairs.cost * TWICE > cost:
+        if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
-    if pairs.reopen():
-        _fit_strong(inputs, pairs, partial(fitted, structures=structures))
-        _fit_couplings(inputs, pairs, plain)
-        pairs.refine(pairs.kept, None)
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
@@ -260,7 +254,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit inputs that explain a large part of the residual, in place, the strongest first."""
     tried: dict[int, JointFit] = {}
-    share, summed = _shares(inputs, pairs)
+    share = _shares(inputs, pairs)
     while share:
         counted = pairs.counted(pairs.strong)
         likely = _likely(share)
@@ -269,18 +263,18 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
+        if _is_large(tried[i]) and _responds(tried[i]):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
-            tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
+            tried, share = {}, _shares(inputs, pairs)  # the residual is clearer now
 
 
-def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
+def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
     """Amplitude (r.m.s.) that each input, or its sum, explains, if it is much of the residual.
 
-    The second value is the inputs of which only the sum does. Friction correlates with an input
-    that does not cause it; a response to an input follows it over all its band.
+    Friction correlates with an input that does not cause it; a response to an input follows it over
+    all its band.
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
@@ -288,7 +282,6 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
         counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
-    sums: set[int] = set()
     rare = FALSE_ALARM / max(len(waiting), 1)
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
@@ -300,8 +293,7 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
                 found[j] = share
         elif (share := _sum_in(inputs[j], rest, rare)) > least:
             found[j] = share
-            sums.add(j)
-    return found, sums
+    return found
 
 
 def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
@@ -333,23 +325,16 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
     return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
 
 
-def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
-    """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
+def _responds(tried: JointFit) -> bool:
+    """Whether the output responds to an input, rather than drifts.
 
     A response so late that it leaves out most of the record explains errors of the stronger inputs'
-    models, such as friction. A pole as slow as the record also explains a drift: it counts only
-    if a drift explains less than the sum does.
+    models, such as friction. A pole as slow as the record also explains a drift.
     """
     problem, fit = tried.problem, tried.best.fit
     if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
         return False
-    slow = spans_record(fit)
-    if not slow or not summed:
-        return not slow
-    rows = drift_rows(problem.y.size)
-    rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
-    drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
-    return spans_record(drifting) or fit.cost < drifting.cost
+    return not spans_record(fit)
 
 
 def _follows_at_all(u: Real, y: Real) -> float:

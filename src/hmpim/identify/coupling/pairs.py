@@ -10,8 +10,7 @@ from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
-from hmpim.identify.fitting.growth import FEW_POLES
-from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.dynamics import Structure
@@ -85,14 +84,6 @@ class Pairs:
             return before[1] is not counted
         return not np.array_equal(before[1], counted)
 
-    def reopen(self) -> bool:
-        """Forget the searches' data if a fit of many poles is not white; return whether one is."""
-        best = [self.fits[i].best.fit for i in self.strong]
-        unsure = any(fit.structure.order > FEW_POLES and not fit.is_white for fit in best)
-        if unsure:
-            self._searched.clear()
-        return unsure
-
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which the contributions of some inputs are known."""
         return common([self.valid, *(self.masks[j] for j in some)])
@@ -111,81 +102,27 @@ class Pairs:
         """Move some fits at once to match the output, or another `y`, but for a bias."""
         if not some:
             return [], []
-        y = self.y if y is None else y
-        begun = [self.fits[j].best.fit for j in some]
-        problems, found = self._moved(some, begun, whitening=whitening, y=y)
-        for j in some:
-            self._take(some, found, j, self.fits[j].best, y)
+        y, valid = self.y if y is None else y, self.counted(some)
+        before = [self.fits[j] for j in some]
+        problems = [replace(fit.problem, y=y, valid=valid, whitening=whitening) for fit in before]
+        begun = [fit.best.fit for fit in before]
+        found = fit_all(problems, [f.structure for f in begun], [f.theta for f in begun])
+        for k, j in enumerate(some):
+            rows = before[k].problem.fixed()[1:]
+            others = (one for one in found if one is not found[k])
+            moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
+            own = replace(before[k].problem, y=y - sum(moved, np.zeros(y.size)), valid=valid)
+            trial = before[k].best
+            best = replace(trial, fit=found[k])
+            self.fits[j] = replace(
+                before[k],
+                problem=own,
+                weighed=own,
+                best=best,
+                trials=tuple(best if t is trial else t for t in before[k].trials),
+                effective_share=effective_share(found[k].residual),
+            )
         return problems, found
-
-    def _moved(
-        self,
-        some: list[int],
-        begun: list[Fit],
-        *,
-        y: Real,
-        whitening: Real | None = None,
-        hopeless: float = np.inf,
-    ) -> tuple[list[Problem], list[Fit]]:
-        """Fit some inputs at once, from where they begin."""
-        fits = [self.fits[j] for j in some]
-        valid = self.counted(some)
-        problems = [replace(fit.problem, y=y, valid=valid, whitening=whitening) for fit in fits]
-        structures, thetas = [fit.structure for fit in begun], [fit.theta for fit in begun]
-        return problems, fit_all(problems, structures, thetas, hopeless=hopeless)
-
-    def _take(self, some: list[int], found: list[Fit], j: int, trial: Trial, y: Real) -> None:
-        """Replace one input's trial by what was found for it."""
-        before, fit = self.fits[j], found[some.index(j)]
-        rows = before.problem.fixed()[1:]
-        others = (one for k, one in zip(some, found, strict=True) if k != j)
-        moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
-        valid = self.counted(some)  # where the residual is known
-        own = replace(before.problem, y=y - sum(moved, np.zeros(y.size)), valid=valid)
-        best = replace(trial, fit=fit)
-        if trial is not before.best:  # of another structure: one more pole was not tried
-            before = replace(before, rivals=(), hidden=None)
-        self.fits[j] = replace(
-            before,
-            problem=own,
-            weighed=own,
-            best=best,
-            trials=tuple(best if t is trial else t for t in before.trials),
-            effective_share=effective_share(fit.residual),
-        )
-
-    def simplify(self) -> bool:
-        """Simplify strong inputs' dynamics where the others' now allow it; return whether any were.
-
-        An error of another input's model may have looked like dynamics. The structures are compared
-        by Schwarz's criterion, with all inputs moved at once.
-        """
-        simpler = False
-        for i in sorted(self.strong, key=lambda j: -self.fits[j].best.fit.structure.parameters):
-            some, joint = self.kept, self.fits[i]
-            if i not in some or not joint.best.fit.is_white:
-                continue  # the criterion is for noise only
-            best, at = joint.best, some.index(i)
-            count = joint.problem.counted
-            least, chosen = 0.0, None
-            for trial in joint.trials:
-                fewer = best.fit.structure.parameters - trial.fit.structure.parameters
-                if fewer <= 0 or trial.intersample != best.intersample:
-                    continue
-                gained = fewer * float(np.log(count))
-                begun = [self.fits[j].best.fit for j in some]
-                begun[at] = trial.fit
-                hopeless = best.fit.objective * float(np.exp(gained / count))
-                _, found = self._moved(some, begun, y=self.y, hopeless=hopeless)
-                lost = count * float(np.log(found[at].objective / best.fit.objective))
-                if lost - gained < least:
-                    least, chosen = lost - gained, (trial, found)
-            if chosen is not None:
-                trial, found = chosen
-                for j in some:
-                    self._take(some, found, j, trial if j == i else self.fits[j].best, self.y)
-                simpler = True
-        return simpler
 
     def demote(self) -> bool:
         """Treat inputs as couplings again that resemble others and are little above the noise.

@@ -40,9 +40,6 @@ _NEGLIGIBLE = 1e-6
 _FAR = 1e9
 """Standard deviations from a level up to which the normal tail can be computed."""
 
-_LEVELS_MOVE = 10
-"""Steps after which levels covered by noise are fixed: their scatter is far below the noise."""
-
 _LEAST_NOISE = 1e-9
 """Smallest standard deviation of the noise, relative to that of the output."""
 
@@ -138,7 +135,7 @@ def fit_censored(
     data = _data(problem, saturation, arrivals, drift)
     state = _start(data, fit)
     damping, converged = 1e-4, False
-    for count in range(_MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         step = _step(state, 0.0)
         if 0.0 <= float(step @ state.score) < _NEGLIGIBLE:
             converged = True
@@ -152,9 +149,6 @@ def fit_censored(
         else:  # no step increases it: the limit of floating-point arithmetic
             converged = True
             break
-        if data.noise_after and count < _LEVELS_MOVE:
-            data = _levels_again(data, state)
-            state = _evaluated(data, state.fit, state.log_sigma) or state
     return _finished(data, state, converged)
 
 
@@ -302,17 +296,6 @@ def _moved(data: _Data, state: _State, step: Real) -> _State | None:
         return None
     floor = np.log(_LEAST_NOISE * max(float(np.std(data.y)), np.finfo(float).tiny))
     return _evaluated(data, moved, max(state.log_sigma + float(step[-1]), float(floor)))
-
-
-def _levels_again(data: _Data, state: _State) -> _Data:
-    """Move the levels to the mean of the samples where the prediction is beyond them."""
-    low, high = data.low_edge, data.high_edge
-    below, above = state.prediction < low, state.prediction > high
-    if np.count_nonzero(below) > 3:
-        low = low + float(np.mean((data.y - low)[below]))
-    if np.count_nonzero(above) > 3:
-        high = high + float(np.mean((data.y - high)[above]))
-    return replace(data, low_edge=low, high_edge=high)
 
 
 def _covariance(state: _State, *, white: bool) -> Real:

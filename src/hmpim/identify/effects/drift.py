@@ -14,16 +14,14 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM, LIKELIER
+from hmpim.identify.chance import LIKELIER
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
-from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.colour import bias_drift
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import MOST, PART, TWICE
@@ -84,8 +82,7 @@ def with_drift(
 
     def gained(joint: JointFit) -> float | None:
         gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
-        least = -2 * CLEARLY if _passes_for_drift(first, joint) else 0.0
-        return None if gain < least else gain
+        return None if gain < 0.0 else gain
 
     gain = gained(joint)  # fewer rows explain no more
     if gain is not None and len(columns) < len(every):  # choose again, with the drift known
@@ -98,7 +95,7 @@ def with_drift(
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily
+    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily = lambda _: None
 ) -> tuple[JointFit, Drifting | None] | None:
     """Add a drift to plain dynamics; keep it if that leaves white noise.
 
@@ -154,17 +151,6 @@ def _unless_steady(
     return without_rows(joint, slice(len(columns))), drifting
 
 
-def _passes_for_drift(first: JointFit, drifting: JointFit) -> bool:
-    """Whether a rich model has a pole as slow as the record, and plain dynamics with a drift do.
-
-    If both explain the record, gain and bandwidths are right only with the drift.
-    """
-    fit, plain = first.best.fit, drifting.best.fit
-    slow = spans_record(fit) and drifting.problem.counted >= _FEWEST  # fewer have no shape
-    rich = fit.structure.parameters > plain.structure.parameters
-    return slow and rich and plain.structure.name in PLAIN and is_white(plain.residual)
-
-
 def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> tuple[Finding, ...]:
     """Report how the bias drifts, and doubt the noise if the residual is not `white`."""
     rate, std = drifting.rate * fs, drifting.rate_std * fs
@@ -209,9 +195,7 @@ def is_slow(problem: Problem, fit: Fit) -> bool:
         return False
     # In 1/f noise, polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4
-    if _steepness(residual) > TWICE**2 * flicker:
-        return True
-    return bias_drift(residual, counted.astype(np.float64)).probability < FALSE_ALARM
+    return bool(_steepness(residual) > TWICE**2 * flicker)
 
 
 def _steepness(residual: Real) -> float:

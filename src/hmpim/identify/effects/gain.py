@@ -105,14 +105,13 @@ class Scored:
 
 
 def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainChange | None:
-    """Test whether the gain changes, and whether that explains a rich structure.
+    """Test whether the gain changes along the record.
 
     `first` has a constant gain. `fitted` makes the joint fit to another output with more rows, of
     plain structures only if its third argument is true. `otherwise` returns the share of a fit's
     residual that something else explains, such as a nonlinearity.
 
-    None if no change is significant and no plain structure with one is about as likely as the rich
-    structure, or if something else explains more.
+    None if no change is significant, or if something else explains more.
 
     Examples
     --------
@@ -133,7 +132,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     if best.structure.integrators or best.structure.sampled or best.objective <= 0.0:
         return None
     begin, share = _first_scores(first, otherwise)
-    found = _tried(first, begin, fitted, hopeless=np.inf if share else TWICE * best.cost)
+    found = _tried(first, begin, fitted)
     if not found:
         return None
     lead = max(found, key=lambda one: one.gained)
@@ -143,7 +142,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     least = min(fit.cost, (1.0 - share) * best.cost)
     if (1.0 - otherwise(data, constant)) * constant.cost < least:
         return None
-    if share and not lead.white and best.structure.name not in PLAIN:
+    if not lead.white and best.structure.name not in PLAIN:
         lead = _settled(first, lead.score, fitted, plainly=False) or lead
     score = lead.score
     if lead.gained < -2 * CLEARLY or abs(score.change) <= max(WORTH, DEVIATIONS * score.std):
@@ -172,10 +171,9 @@ def _first_scores(first: JointFit, otherwise: _Share) -> tuple[tuple[Scored, ...
     """Scores to start from, none if no test is significant; and the share that they explain."""
     count, best = first.weighed.counted * first.weighed_share, first.best.fit
     own = scored(first.weighed, best, count)
-    rich = best.structure.name not in PLAIN
     lead = max(own, key=lambda one: one.gain, default=None)
     if lead is None or lead.gain <= searched(len(own)) or abs(lead.change) <= WORTH:
-        return (_scores_of_plain(first, count, otherwise) if rich else ()), 0.0
+        return (), 0.0
     share = -float(np.expm1(-2.0 * lead.gain / count))
     if otherwise(first.weighed, best) > share:
         return (), 0.0
@@ -198,40 +196,17 @@ class _Settled:
         return is_white(self.joint.problem.counting(self.joint.best.fit.residual))
 
 
-def _tried(
-    first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted, *, hopeless: float
-) -> list[_Settled]:
+def _tried(first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted) -> list[_Settled]:
     """Plain fits with a steady change and one that settles, without those that cannot win."""
     steady = [score for score in begin if not score.rate]
     settling = sorted((score for score in begin if score.rate), key=lambda score: -score.gain)
-    found = []
+    found, hopeless = [], np.inf
     for score in (*steady[:1], *settling[:1]):
         one = _settled(first, score, fitted, hopeless=hopeless)
         if one is not None:
             found.append(one)
             hopeless = min(hopeless, TWICE**2 * one.joint.best.fit.cost)
     return found
-
-
-def _scores_of_plain(first: JointFit, count: float, otherwise: _Share) -> tuple[Scored, ...]:
-    """Scores of the plain fit that, with a changing gain, may be as likely as the rich one."""
-    best, problem = first.best, first.weighed
-    least, most, lead = TWICE * best.fit.objective, 0.0, best.fit
-    scores: tuple[Scored, ...] = ()
-    for trial in first.trials:
-        plain = trial.fit.structure
-        if plain.name not in PLAIN or trial.intersample != best.intersample:
-            continue
-        fit = fit_structure(problem, plain, trial.fit.theta, iterations=0)
-        tested = scored(problem, fit, count)
-        gain = max((one.gain for one in tested), default=0.0)
-        fewer = best.fit.structure.parameters - plain.parameters - 1
-        cost = fit.objective * float(np.exp(-(2.0 * gain + fewer * np.log(count)) / count))
-        if cost < least:
-            least, scores, most, lead = cost, tested, gain, fit
-    if scores and otherwise(problem, lead) > -float(np.expm1(-2.0 * most / count)):
-        return ()
-    return scores
 
 
 def _settled(

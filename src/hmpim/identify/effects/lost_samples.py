@@ -77,27 +77,11 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     away = np.abs(residual - level)
     motion = np.ptp(sliding_window_view(np.pad(prediction, 1, mode="edge"), 3), axis=1)
     # A late sample differs by its motion at most, and is no spike.
-    moving = np.clip(TWICE * DEVIATIONS * _spread_by_speed(away, motion), motion, TWICE * motion)
-    away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), moving)
+    away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), motion)
     for a, b in zip(*runs_of(away), strict=True):
         if b - a > _LONGEST_SPIKE:
             away[a:b] = False
     return away if away.any() and np.mean(away) < MUCH else None
-
-
-def _spread_by_speed(away: Real, motion: Real) -> Real:
-    """Deviation at each sample that its motion explains, (n,), from samples that move as fast.
-
-    An error in time, or of the model, is a share of the motion, at an edge in one sample of three.
-    """
-    order = np.argsort(motion)
-    largest = sliding_window_view(np.pad(away, 1, mode="edge"), 3).max(axis=1)
-    least = np.finfo(float).eps * max(float(motion.max()), float(largest.max()))
-    share = (largest / np.maximum(motion, max(least, np.finfo(float).tiny)))[order]
-    alike = sliding_window_view(np.pad(share, _WINDOW // 2, mode="reflect"), _WINDOW)
-    out = np.empty(away.size)
-    out[order] = np.median(alike, axis=1) / BULK * motion[order]
-    return out
 
 
 def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:

@@ -15,9 +15,9 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
-from hmpim.identify.chance import BULK, DEVIATIONS, FALSE_ALARM, ONE_SIDED, deviations
+from hmpim.identify.chance import BULK, FALSE_ALARM, ONE_SIDED
 from hmpim.identify.effects.smeared import Side, smeared_plateaus
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TOLERATED, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TWICE
 
 __all__ = ["Saturation", "detect_saturation", "goes_beyond"]
 
@@ -28,10 +28,6 @@ a sinusoid's gives 2.4 to 3."""
 
 _FEWEST = 8
 """Fewest samples at the level, and just below it."""
-
-_FINE = 64
-"""Cells of the histogram per standard deviation of the noise; they move the densest place by no
-more than 1e-5 of it."""
 
 _VISITS = 2
 """Fewest stays at the level that must look alike, without a prediction."""
@@ -94,18 +90,14 @@ def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 
     return Saturation(low=low, high=high, tolerance=0.5 * step)
 
 
-def _upper(y: Real, prediction: Real | None, step: float, sigma: float) -> Side | None:
-    """The upper level: of equal values or, without a prediction, of scattered ones too."""
+def _upper(y: Real, prediction: Real | None, step: float, scatter: float) -> Side | None:
+    """The upper level of equal values; None where there is none."""
     span = float(np.ptp(y))
     if span == 0.0:
         return None
     exact = _exact(y, span, step)
-    if exact is not None and _is_clipped(y, exact, prediction, step, span, sigma):
+    if exact is not None and _is_clipped(y, exact, prediction, step, span, scatter):
         return exact
-    if prediction is None and max(step, 1e-6 * span) < sigma < TOLERATED * span:
-        side = _scattered(y, sigma)
-        if side is not None and _is_clipped(y, side, None, step, span, sigma):
-            return side
     return None
 
 
@@ -133,42 +125,12 @@ def _exact(y: Real, span: float, step: float) -> Side | None:
     return Side(level=top, std=float(error), at=at, exact=True)
 
 
-def _scattered(y: Real, sigma: float) -> Side | None:
-    """A cluster of samples within a few `sigma` of the top."""
-    top = float(y.max())
-    most = deviations(y.size) * sigma  # a level cannot be further below the top
-    upper = y[y > top - 2.0 * most]
-    cell = ((top - upper) * (_FINE / sigma)).astype(np.intp)
-    held = np.bincount(cell)
-    filled = held > 0
-    held = held[filled]
-    place = np.bincount(cell, weights=upper)[filled] / held
-    level = top - DEVIATIONS * sigma
-    for _ in range(50):  # moves to where the values are densest
-        weight = held * np.exp(-0.5 * ((place - level) / sigma) ** 2)
-        before, level = level, float(weight @ place / weight.sum())
-        if abs(level - before) < 1e-6 * sigma:
-            break
-    near = np.abs(y - level) < DEVIATIONS * sigma
-    count = int(np.count_nonzero(near))
-    if count < 3 * _FEWEST or top > level + most:
-        return None
-    width = float(np.std(y[near]))
-    return Side(
-        level=float(np.mean(y[near])),
-        std=width / float(np.sqrt(count)),
-        at=y > level - DEVIATIONS * sigma,
-        exact=False,
-    )
-
-
 def _is_clipped(
     y: Real, side: Side, prediction: Real | None, step: float, span: float, scatter: float
 ) -> bool:
     """Whether a level is one of clipping, by the values near it or by the prediction."""
-    resolution = max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
-    if side.exact:
-        resolution *= 2.0  # the level covers half a step on either side
+    # The level covers half a step on either side.
+    resolution = 2.0 * max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     distance = side.level - y[~side.at]
     reach = resolution + MUCH * span
     below = distance[(distance >= 0) & (distance < reach)]
@@ -212,7 +174,7 @@ def _visits(at: Mask) -> NDArray[np.intp]:
 
 
 def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
-    """Whether the level is reached and left at speed, alike on both sides, and is flat between."""
+    """Whether the level is reached and left at speed, alike on both sides."""
     visits = _visits(side.at)
     if visits.shape[0] < _VISITS:
         return False
@@ -227,18 +189,7 @@ def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
         leaving.append(after.size if after.all() else int(np.argmin(after)))
     if min(np.median(coming), np.median(leaving)) < 2.0:  # a jump, as of a square wave
         return False
-    if not 1.0 / TWICE < sum(coming) / sum(leaving) < TWICE:
-        return False
-    return side.exact or _neither_bends_nor_tilts(y, visits, resolution / 3.0)
-
-
-def _neither_bends_nor_tilts(y: Real, visits: NDArray[np.intp], sigma: float) -> bool:
-    """Whether the values within the stays have no common slope or curvature."""
-    place = np.concatenate([np.linspace(-1, 1, last - first + 1) for first, last in visits])
-    value = np.concatenate([y[first : last + 1] for first, last in visits])
-    rows = np.stack([np.ones(place.size), place, place**2])
-    weights = np.linalg.lstsq(rows.T, value, rcond=None)[0]
-    return bool(abs(weights[1]) < sigma and abs(weights[2]) < sigma)
+    return bool(1.0 / TWICE < sum(coming) / sum(leaving) < TWICE)
 
 
 def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:

@@ -10,11 +10,10 @@ between         refits under the other assumptions
 enrich          which richer structures to try, and where from
 course          the search before the choice: start, ahead, wander, beginning, enrichment
 beginning       which samples count, and whether the record begins at rest
-whitening       the noise of all trials, and whether whitening may be trusted
+whitening       the noise of all trials
 trial           all trials, and the choice among them
 plainer         plain structures next to a rich one
 washout         a washout in place of a drift
-nested          one pole or two: error bars that admit both
 unrelated       whether an output follows its input at all
 halves          whether the halves of a record agree
 """

@@ -186,7 +186,6 @@ def look_again(
         if problem.is_coloured and is_white(trial.fit.residual[every & ~ends]):
             innovations = trial.fit.residual  # only the ends are coloured
         if _stands_out(innovations, every & ends, every & ~ends):
-            ends = _until_quiet(innovations, every, ends, trial.fit.delay, reach)
             return replace(seen, valid=~ends if seen.valid is None else seen.valid & ~ends)
     if known is not None:
         clear = _of_measured(trial.fit, every, known)
@@ -201,22 +200,6 @@ def look_again(
         # Noise with the colour of a mode would explain more than the mode's own free response.
         begins = begins_of(problem.plain, trial.fit, lag=lag)
     return None if begins is None else begin_at(seen, begins, count)
-
-
-def _until_quiet(innovations: Real, every: Mask, first: Mask, delay: float, reach: int) -> Mask:
-    """Samples over which the ends ring above the noise.
-
-    Ringing dies away within a twentieth of the record; anything longer has another cause, and
-    only the `first` samples are then returned.
-    """
-    known, count = first, innovations.size
-    while reach < FEW * count:
-        reach *= 2
-        wider = ringing(count, delay, reach)
-        if not _stands_out(innovations, every & wider & ~known, every & ~wider):
-            return known
-        known = wider
-    return first
 
 
 def ringing_of(source: SampledInput) -> int:

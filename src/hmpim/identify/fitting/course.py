@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
-from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
+from hmpim.identify.fitting.beginning import REACH, begin_at, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
@@ -22,9 +22,7 @@ from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, 
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
-from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
-from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -41,7 +39,6 @@ __all__ = [
     "continued",
     "enrich",
     "find_beginning",
-    "fit_in_motion",
     "free_from_wander",
     "is_unanswered",
     "looks_held",
@@ -242,7 +239,8 @@ def find_beginning(course: Course) -> Course:
         settled = polished(course.problem, course.best)
         fits = [settled if fit is course.best else fit for fit in fits]
     counted = count_in(data, natural, fits, seen, course.known)
-    if counted.begins is None and settled is None and in_motion(data.u):
+    poor = is_poor(course.best, course.problem.spread)
+    if counted.begins is None and poor and in_motion(data.u):
         counted = _in_motion(course) or counted
     if counted.begins is not None:  # fits that assumed rest may have ended anywhere
         problem = data.problem(natural, counted)
@@ -294,30 +292,6 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     return completed(course)
 
 
-def fit_in_motion(course: Course, fit: Fit) -> Course | None:
-    """Fit from mid-motion; None unless that leaves white noise.
-
-    Parameters
-    ----------
-    course : Course
-        The plain fits so far.
-    fit : Fit
-        Of any structure, from a problem with nuisance rows. The drift in them may be the fit's
-        free response, or that of a washout.
-    """
-    data, given = course.data, course.given
-    counted = begin_at(given, max(int(np.ceil(fit.delay)), 0) + REACH, data.y.size)
-    if counted is None or fit.structure.integrators:
-        return None
-    problem = data.problem(course.natural, counted)
-    free: Fit | None = refit(problem, fit) if fit.structure.order else None
-    if free is None or not free.is_white:
-        free = washed_out(problem, fit)
-    if free is None or not free.is_white:
-        return None
-    return replace(course, others=(), counted=counted, fits=[free], settled=None)
-
-
 def continue_between(course: Course) -> Fits:
     """All fits, the leading ones also under the other assumptions between the samples."""
     return fit_under_each_assumption(
@@ -333,7 +307,7 @@ def is_unanswered(course: Course, fitted: Fits) -> bool:
 
 
 def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
-    """Fit richer structures while the residual follows the input, then the plain ones again.
+    """Fit richer structures while the residual follows the input.
 
     A small residual that follows the input counts as missing dynamics only where a richer
     structure leaves white noise: on real hardware it usually has another cause.
@@ -350,19 +324,6 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     )
     if not required and not any(fit.is_white for fit in richer):
         return course, fitted
-    if richer and course.counted.begins is not None:
-        leading = min(richer, key=lambda f: f.objective)
-        from_rest = refit(data.problem(course.natural, course.given), leading)
-        resting = count_in(data, course.natural, [from_rest], course.given, course.known)
-        # If it is at rest after all, the structure was wrong, and not the beginning.
-        at_rest = resting.begins is None
-        counted = resting if at_rest else begin_later(course.counted, leading)
-        if counted is not None:
-            course = replace(course, counted=counted)
-            every = _again(course, [*fits, *richer])
-            fits, richer = every[: len(fits)], every[len(fits) :]
-    if richer:
-        fits = reduced(course.problem, fits, richer)
     course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
     return course, continue_between(course)
 

@@ -16,7 +16,6 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import look_again
 from hmpim.identify.fitting.between import refit_between
-from hmpim.identify.fitting.candidates import pruned
 from hmpim.identify.fitting.course import (
     Course,
     continue_between,
@@ -29,9 +28,9 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows, polished, refit, refit_all
+from hmpim.identify.fitting.data import Fits, follows, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
     HiddenPole,
@@ -42,8 +41,7 @@ from hmpim.identify.fitting.growth import (
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
-from hmpim.identify.fitting.whitening import is_contradicted, refit_whitened, weighed_by_noise
-from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.fitting.whitening import refit_whitened, weighed_by_noise
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -122,7 +120,7 @@ def chosen_of(
     course, fitted = enrich(course, fitted)
     course, trials, best, share = weigh_and_look_again(course, fitted)
     joint = settle(course, trials, best, share)
-    return ask_for_poles(joint, course, structures) if growing else joint
+    return grow_poles(joint, course, structures) if growing else joint
 
 
 def settle(
@@ -153,7 +151,7 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known)
         bandlimited = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if bandlimited else None
-        if (again, finer) == (None, None) and not _is_needlessly_coloured(problem, best.fit):
+        if (again, finer) == (None, None):
             break
         again = again or seen
         course = replace(course, counted=again, data=(finer or course).data.plain)
@@ -163,34 +161,6 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
         course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
-
-
-def _is_needlessly_coloured(problem: Problem, fit: Fit) -> bool:
-    """Whether the fit leaves white noise if it is refitted without a noise colour.
-
-    If earlier fits were unfinished, the colour may be that of a mode, and hide the mode's free
-    response.
-    """
-    if not problem.is_coloured or problem.begins is None:
-        return False
-    plain = problem.plain
-    return is_white(plain.counting(refit(plain, fit).residual))
-
-
-def ask_for_poles(
-    joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> JointFit:
-    """Add poles, again without noise colour if the richer fit contradicts it."""
-    grown, data = grow_poles(joint, course, structures), course.data
-    if grown.best is joint.best or data.noise is None:
-        return grown
-    if not is_contradicted(data, grown.best, course.counted):
-        return grown
-    course = replace(course, data=data.plain)
-    fitted = [(trial.intersample, trial.fit) for trial in joint.trials]
-    share = joint.effective_share
-    trials, best = _decide(course, refit_whitened(course.data, fitted, course.counted), share)
-    return grow_poles(settle(course, trials, best, share), course, structures)
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
@@ -207,32 +177,22 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
         if other.grown and other.grown[-1].criterion < leading.criterion:
             growth, leading = other, other.grown[-1]
     joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    return joint if leading is joint.best else _with_leading(leading, joint, course, structures)
+    return joint if leading is joint.best else _with_leading(leading, joint, course)
 
 
-def _with_leading(
-    leading: Trial, joint: JointFit, course: Course, structures: tuple[StructureName, ...]
-) -> JointFit:
-    """The joint fit with a grown trial as the best, polished and under each assumption.
-
-    The added pole may lead to new starts for plainer structures, one of which may be better still.
-    """
+def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
+    """The joint fit with a grown trial as the best, polished and under each assumption."""
     mode = leading.intersample
     problem = course.data.problem(mode, course.counted)
     count = problem.counted * joint.weighed_share
-    fits = [t.fit for t in joint.trials if t.intersample == mode]
-    plainer = [trial_of(mode, fit, count) for fit in pruned(problem, fits, structures)]
-    chosen = min([leading, *plainer], key=lambda trial: trial.criterion)
-    fit = polished(problem, chosen.fit)
-    trials = [trial for trial in joint.trials if trial is not chosen]
+    fit = polished(problem, leading.fit)
+    trials = [trial for trial in joint.trials if trial is not leading]
     for other in () if course.alone else BETWEEN:
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
             trials.append(trial_of(other, moved, count))
     best = trial_of(mode, fit, count)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
-    if chosen is not leading:  # it was not tested for one more pole
-        return fresh
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 
 
@@ -304,9 +264,6 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
         course = replace(course, data=weighed)
         fitted = refit_whitened(course.data, fitted, seen)
     trials, best = _decide(course, fitted, share)
-    if weighed.noise is not None and is_contradicted(course.data, best, seen):
-        course = replace(course, data=data.plain)
-        trials, best = _decide(course, refit_whitened(course.data, fitted, seen), share)
     return course, trials, best, share
 
 

@@ -1,4 +1,4 @@
-"""The kind of noise: white, correlated, low-frequency, or with a line; and whether the bias drifts.
+"""The kind of noise: white, correlated, low-frequency, or with a line.
 
 All of it is estimated from the residual of a fit, and is only as good as the fit.
 """
@@ -12,11 +12,9 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import SEARCHED
-from hmpim.identify.noise.covariance import covariance
-from hmpim.identify.noise.whiteness import autocovariance, effective_share, is_white
-from hmpim.identify.worth import TOLERATED
+from hmpim.identify.noise.whiteness import autocovariance, is_white
 
-__all__ = ["Colour", "Drift", "NoiseColour", "bias_drift", "line_of", "noise_colour", "tone_of"]
+__all__ = ["Colour", "NoiseColour", "line_of", "noise_colour", "tone_of"]
 
 Colour = Literal["white", "autoregressive", "power_law"]
 """White; correlated over a few samples (AR(1)); or a power of the frequency (1/f, wander)."""
@@ -49,15 +47,6 @@ class NoiseColour:
         return f"{words}, with a line at {self.line_frequency:.4g} Hz"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drift:
-    """Drift of the bias over the record."""
-
-    slope: float  # the residual's unit per second
-    std: float  # its standard deviation, for noise of any colour
-    probability: float  # chance of so great a slope without any drift
-
-
 def noise_colour(residual: Real, fs: float) -> NoiseColour:
     """Describe the noise in the residual of a fit, (m,), by the samples that count.
 
@@ -83,54 +72,6 @@ def noise_colour(residual: Real, fs: float) -> NoiseColour:
     if r[0] > 0 and not is_white(e):
         kind, exponent = _likelier(e)
     return NoiseColour(kind=kind, coefficient=rho, exponent=exponent, line_frequency=line)
-
-
-def bias_drift(residual: Real, time: Real) -> Drift:
-    """Slope in the residual, (n,), of a model with a constant bias, at rising times.
-
-    Its error is valid for coloured noise.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> time = np.arange(1000) / 100
-    >>> noise = 0.1 * np.random.default_rng(1).standard_normal(1000)
-    >>> found = bias_drift(0.05 * time + noise, time)
-    >>> bool(abs(found.slope - 0.05) < 3 * found.std), found.probability < 1e-4
-    (True, True)
-    """
-    rows = np.stack([np.ones(time.size), time - time.mean()])
-    slope = float(rows[1] @ residual / (rows[1] @ rows[1]))
-    noise = residual - residual.mean() - slope * rows[1]
-    if not np.any(noise):
-        return Drift(slope=slope, std=0.0, probability=float(slope == 0.0))
-    variance = covariance(rows, noise, freedom=time.size - 2, white=is_white(noise))[1, 1]
-    std = float(np.sqrt(max(variance, _wandering_variance(rows[1], noise))))
-    freedom = max((time.size - 2) * effective_share(noise), 1.0)
-    chance = float(2 * scipy.stats.t.sf(abs(slope) / std, freedom))
-    return Drift(slope=slope, std=std, probability=chance)
-
-
-def _wandering_variance(ramp: Real, e: Real) -> float:
-    """Variance of the slope under noise whose power is f^-α down to the record's length.
-
-    0 unless the noise is so slow that no autoregression describes its lowest frequencies.
-    """
-    if is_white(e):
-        return 0.0
-    r = autocovariance(e, 1)
-    kind, exponent = _likelier(e)
-    if kind != "power_law" and r[1] <= (1 - TOLERATED) * r[0]:
-        return 0.0
-    n = e.size
-    omega = 2 * np.pi * np.arange(n + 1) / (2 * n)
-    omega[0] = omega[1]
-    inside = slice(2, n - 1, 2)
-    power = np.abs(scipy.fft.rfft(e)[1 : (n - 1) // 2]) ** 2 / n
-    shape = omega**-exponent
-    level = float(np.mean(power / shape[inside][: power.size]))
-    weights = np.abs(scipy.fft.rfft(ramp / (ramp @ ramp), 2 * n)) ** 2
-    return float(level * (weights[1:] @ shape[1:]) / n)
 
 
 def line_of(e: Real, fs: float) -> float | None:

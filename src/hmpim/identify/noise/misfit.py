@@ -11,7 +11,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import transform_of, windowed_power
 from hmpim.identify.worth import DEEPEST, PART
 
-__all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
+__all__ = ["Misfit", "misfit", "misfits"]
 
 _GROUPS = 24
 """Most groups of neighbouring bins in the band."""
@@ -93,13 +93,23 @@ def misfits(
     """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
 
     `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
-    residuals, and `delays`, (k,), are in samples.
+    residuals, and `delays`, (k,), are in samples. In each group of neighbouring bins one gain from
+    the input explains what it can.
     """
-    power, taken, total, width = _followed(
-        stimulus, residuals, samples=samples, delays=delays, band=band
-    )
-    if not power.size:
+    first = max(int(np.ceil(band[0] * samples)), 1)
+    last = min(int(band[1] * samples), stimulus.size - 1)
+    width = max((last + 1 - first) // _GROUPS, 4)
+    groups = max(last + 1 - first, 0) // width
+    if not groups:
         return np.zeros(delays.size), np.ones(delays.size)
+    bins = np.arange(first, first + groups * width)
+    u = stimulus[bins].reshape(groups, width)
+    turn = np.exp((2j * np.pi / samples) * np.outer(delays, bins))
+    e = (residuals[:, bins] * turn).reshape(delays.size, groups, width)
+    power = np.sum(np.abs(u) ** 2, axis=1)
+    along = np.sum(u.conj() * e, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
+    taken = along.real**2 + along.imag**2  # of any unit
+    total = np.sum(e.real**2 + e.imag**2, axis=2)
     noise = (total - taken) / (width - 1)
     noisy = np.all(noise > 0, axis=1)
     noise, total = np.where(noisy[:, None], noise, 1.0), np.where(noisy[:, None], total, 1.0)
@@ -109,59 +119,5 @@ def misfits(
     beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
     return (
         np.where(noisy, np.maximum(beyond, 0.0), 0.0),
-        np.where(noisy, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
+        np.where(noisy, scipy.special.chdtrc(2 * groups, statistic), 1.0),
     )
-
-
-def _followed(
-    stimulus: Complex, answers: Complex, *, samples: int, delays: Real, band: tuple[float, float]
-) -> tuple[Real, Real, Real, int]:
-    """Explain each answer by one gain from the input in each group of neighbouring bins.
-
-    Returned are the power of the input in each group, (g,), the explained and the total power of
-    each answer, both (k, g), and the number of bins in a group. A band with too few bins has no
-    groups.
-    """
-    count, n = answers.shape[0], samples
-    first = max(int(np.ceil(band[0] * n)), 1)
-    last = min(int(band[1] * n), stimulus.size - 1)
-    width = max((last + 1 - first) // _GROUPS, 4)
-    groups = max(last + 1 - first, 0) // width
-    bins = np.arange(first, first + groups * width)
-    U = stimulus[bins].reshape(groups, width)
-    E = (answers[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
-        count, groups, width
-    )
-    power = np.sum(np.abs(U) ** 2, axis=1)
-    along = np.sum(U.conj() * E, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
-    taken = along.real**2 + along.imag**2  # of any unit
-    return power, taken, np.sum(E.real**2 + E.imag**2, axis=2), width
-
-
-def unexplained_response(
-    u: Real, y: Real, residual: Real, *, delay: float, band: tuple[float, float]
-) -> float:
-    """Share of the response (r.m.s. over frequency) that is still in the residual, from 0 to 1.
-
-    A sweep within limits moves most at its low end, so a model may miss two thirds of the response
-    at the high end and still explain 99 % of the output's power. Here every group of bins has the
-    same weight. Twice the share that noise alone would explain is subtracted. Delay and band are
-    as for `misfit`.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> u = rng.standard_normal(2000)
-    >>> y = 2.0 * u
-    >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
-    0.1
-    """
-    answers, delays = np.asarray(scipy.fft.rfft(np.stack([y, residual]))), np.full(2, delay)
-    power, taken, total, width = _followed(
-        transform_of(u), answers, samples=u.size, delays=delays, band=band
-    )
-    excited = power > 0.0
-    noise = np.maximum(total - taken, 0.0) / (width - 1)
-    missed = np.maximum(taken - 2.0 * noise, 0.0)[1, excited] / power[excited]
-    gains = np.sum(taken[0, excited] / power[excited])
-    return float(np.sqrt(np.sum(missed) / gains)) if gains > 0.0 else 0.0

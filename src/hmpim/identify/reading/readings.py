@@ -8,7 +8,6 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.derivatives import jacobian, products
 from hmpim.identify.fitting.held_steps import in_whole_samples
-from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
@@ -87,7 +86,7 @@ def read_parameters(
     cov = known_covariance
     if cov is None:
         gram = halves.sum(axis=0)[:-1, :-1]
-        cov = widened(joint, _covariance(joint, gram, residual, freedom=freedom, white=white))
+        cov = _covariance(joint, gram, residual, freedom=freedom, white=white)
     if weighed.is_coloured:
         cov = _wandering(cov, fit.residual, joint.problem.counted)
     parameters, system, coefficients = read_figures(

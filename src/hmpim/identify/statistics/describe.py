@@ -6,7 +6,6 @@ import numpy as np
 
 from hmpim.errors import RecordError
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.nested import widened
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
 from hmpim.identify.judgement.between_samples import other_intersample, wide_span
@@ -152,7 +151,7 @@ def _read(statistics: Statistics, joint: JointFit, highest: float) -> Readings:
     """Every figure of the chosen fit, and their covariance."""
     best, fs, share = as_fitted(joint.best.fit), statistics.fs, joint.weighed_share
     left, vector = best.left, np.concatenate([best.theta, best.linear])
-    cov = widened(joint, best.covariance)
+    cov = best.covariance
     parameters, system, spread = read_figures(
         best.structure,
         vector,
