@@ -132,9 +132,17 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
         (b"time,u,y\n0,1,\x00\xfe\n", "is a binary file"),
         ("word\nword\nword\n", "holds no rows of numbers"),
         ('{"schema": "hmpim/identification/2"}\n', "holds JSON and .* with hmpim report"),
+        ('{"time":{"0":0.0,"1":0.1},"u":{"0":1,"1":2},"y":{"0":1,"1":3}}', "export the samples"),
+        ("[[0,1,2],[1,3,4],[2,5,6]]", "holds JSON and no table"),
         (
             "time,a,b\n0,1,2\n1,3,4\n",
             r"which column is the input; its columns are a, b: .*--input a",
+        ),
+        ("time,u\n0,1\n1,3\n", "has no column for the output; its columns are u, and an input and"),
+        ("time,u,position\n0,1,2\n1,3,4\n", "2 columns that may be the input"),
+        (
+            "time,position,velocity,acceleration\n0,1,2,3\n1,3,4,5\n",
+            "as a stimulus does, and no output is named; play it with hmpim run",
         ),
         ("time,u,b\n0,1,2\n1,3,4\n", r"which column is the output; .*--output b"),
         ("time,u,command,y\n0,1,2,3\n1,3,4,5\n", r"2 columns that may be the input \(u, command\)"),
