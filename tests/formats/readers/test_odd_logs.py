@@ -112,3 +112,21 @@ def test_a_name_to_copy_is_quoted_for_the_shell(tmp_path):
     path = mat(tmp_path / "m.mat", data=np.c_[U, Y])
     with pytest.raises(FormatError, match=r"--input 'data\(:,1\)'$"):
         read(path, fs=samples.FS)
+
+
+@pytest.mark.parametrize("kind", ["csv", "mat"])
+@pytest.mark.parametrize(("name", "step", "codes"), [
+    ("time", 5.0, ["time_unit"]),
+    ("time", 0.005, []),
+    ("time [ms]", 5.0, []),
+])  # fmt: skip
+def test_time_in_ms_that_states_no_unit_is_remarked(kind, name, step, codes, tmp_path):
+    """It had been taken for s without a word: 0.2 Hz for 200 Hz."""
+    path = tmp_path / f"a.{kind}"
+    t, u = step * np.arange(60), np.sin(np.arange(60))
+    if kind == "csv":
+        np.savetxt(path, np.c_[t, u, u], delimiter=",", header="time,u,y", comments="")
+    else:
+        mat(path, time=t, u=u, y=u)
+    record = read(path, time=name if "[" in name else None)
+    assert [f.code for f in record.findings if f.code == "time_unit"] == codes

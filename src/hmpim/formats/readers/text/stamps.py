@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, UnitError
 from hmpim.formats.readers.text.cells import column_of
+from hmpim.record import Finding
 from hmpim.units import conversion_factor
 
-__all__ = ["StampColumn", "looks_like_stamp", "stamp_column"]
+__all__ = ["StampColumn", "looks_like_stamp", "slow_seconds", "stamp_column"]
 
 Kind = Literal["number", "unix", "date", "clock"]
 
@@ -188,6 +189,27 @@ def _nanoseconds(cell: str, kind: Kind) -> int | None:
         shift = int(zone[1:3]) * 3600 + int(zone[-2:]) * 60
         ticks -= (shift if zone[0] == "+" else -shift) * _NANO
     return int(day.astype(np.int64)) * _DAY * _NANO + ticks
+
+
+def slow_seconds(name: str, stamps: NDArray[np.float64]) -> tuple[Finding, ...]:
+    """Say that stamps without a unit are read in s, if a second or more lies between two.
+
+    Examples
+    --------
+    >>> slow_seconds("time", np.array([0.0, 5.0, 10.0]))[0].message[:55]
+    "'time' states no unit and is read in s: a sample every "
+    >>> slow_seconds("time", np.array([0.0, 0.005, 0.01]))
+    ()
+    """
+    steps = np.diff(stamps[np.isfinite(stamps)])
+    steps = steps[steps > 0]
+    if not steps.size or np.median(steps) < 1.0:
+        return ()
+    message = (
+        f"{name!r} states no unit and is read in s: a sample every {np.median(steps):g} s; if it "
+        f"is in ms, write '{name} [ms]' into the heading, or as --time"
+    )
+    return (Finding(code="time_unit", message=message, severity="info", parameters=()),)
 
 
 def _largest(cells: Sequence[str], decimal: str) -> float:
