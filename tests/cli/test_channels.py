@@ -81,7 +81,9 @@ def test_a_file_without_time_is_listed_and_says_what_it_needs(tmp_path):
     done = run("channels", path)
     assert done.exit_code == 0
     assert "no time" in done.stdout
-    assert "yet: no time is known; name it with --time, or give the rate with --fs" in " ".join(done.stdout.split())
+    assert "yet: no time is known; name it with --time, or give the rate with --fs" in " ".join(
+        done.stdout.split()
+    )
     done = run("channels", path, "--fs", 10)
     assert re.search(r"a +– +10 Hz +0 to 5\.9 s", done.stdout)
 
