@@ -334,7 +334,7 @@ def _uniform(since: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.
     first and the last tick of a part, some of which is missing.
     """
     place = np.arange(since.size, dtype=np.float64)
-    tick = np.cumsum(np.diff(since, prepend=since[0]) > 0)
+    tick = np.cumsum(np.diff(since, prepend=since[0]) > 0, dtype=np.int64)
     of = part[np.unique(tick, return_index=True)[1]]
     inner = (np.diff(of, prepend=-1) == 0) & (np.diff(of, append=-1) == 0)
     whole = inner[tick]
