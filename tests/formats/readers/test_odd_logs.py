@@ -7,6 +7,7 @@ import scipy.io
 import sample_logs as samples
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats import read
+from hmpim.formats.readers import Layout, reader_for
 
 T, U, Y = samples.TIME, samples.U, samples.Y
 
@@ -116,18 +117,45 @@ def test_a_name_to_copy_is_quoted_for_the_shell(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["csv", "mat"])
-@pytest.mark.parametrize(("name", "step", "codes"), [
-    ("time", 5.0, ["time_unit"]),
-    ("time", 0.005, []),
-    ("time [ms]", 5.0, []),
-])  # fmt: skip
-def test_time_in_ms_that_states_no_unit_is_remarked(kind, name, step, codes, tmp_path):
-    """It had been taken for s without a word: 0.2 Hz for 200 Hz."""
+@pytest.mark.parametrize(
+    ("name", "start", "step", "codes"),
+    [
+        ("time", 0.0, 5.0, ["time_unit"]),
+        ("time", 46082.4, 0.005 / 86400, ["time_unit"]),
+        ("time", 46082.4, 0.005, []),
+        ("time", 0.0, 5e-8, []),
+        ("time [ms]", 0.0, 5.0, []),
+        ("time [d]", 46082.4, 0.005 / 86400, []),
+    ],
+)
+def test_time_in_ms_or_days_that_states_no_unit_is_remarked(
+    kind, name, start, step, codes, tmp_path
+):
+    """It had been taken for s without a word: 0.2 Hz, or 17 MHz, for 200 Hz."""
     path = tmp_path / f"a.{kind}"
-    t, u = step * np.arange(60), np.sin(np.arange(60))
+    t, u = start + step * np.arange(60), np.sin(np.arange(60))
     if kind == "csv":
         np.savetxt(path, np.c_[t, u, u], delimiter=",", header="time,u,y", comments="")
     else:
         mat(path, time=t, u=u, y=u)
     record = read(path, time=name if "[" in name else None)
     assert [f.code for f in record.findings if f.code == "time_unit"] == codes
+
+
+@pytest.mark.parametrize(
+    ("index", "time"),
+    [
+        (lambda k: f"2026-03-01 10:00:{k / 200:06.3f}", None),
+        (lambda k: f"{k / 200}", "column 1"),
+    ],
+    ids=["dates", "seconds"],
+)
+def test_an_index_of_pandas_without_a_name_may_be_the_time(index, time, tmp_path):
+    """It was dropped without a word, as one that counts the rows still is."""
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{index(k)},{k % 7},{k % 5}\n" for k in range(60))
+    path.write_text(",u,y\n" + rows)
+    assert read(path, time=time).fs == pytest.approx(200.0)
+    path.write_text(",time,u,y\n" + "".join(f"{k},{k / 200},{k % 7},{k % 5}\n" for k in range(60)))
+    found = reader_for(path).channels(path, Layout())
+    assert (found.time, [c.name for c in found.channels]) == ("time", ["u", "y"])

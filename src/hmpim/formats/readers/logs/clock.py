@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, UnitError
-from hmpim.formats.readers.text import TIME_NAMES, named, slow_seconds
+from hmpim.formats.readers.text import TIME_NAMES, named, unlikely_seconds
 from hmpim.record import Finding
 from hmpim.units import conversion_factor
 
@@ -53,7 +53,7 @@ class ClockColumn:
             return (
                 _scaled(values, factor),
                 None,
-                () if self.unit else slow_seconds(self.name, values),
+                () if self.unit else unlikely_seconds(self.name, values),
             )
         base = float(np.floor(finite.min()))
         told = Finding(

@@ -24,8 +24,8 @@ from hmpim.formats.readers.text.source import is_text, open_source
 from hmpim.formats.readers.text.stamps import (
     StampColumn,
     looks_like_stamp,
-    slow_seconds,
     stamp_column,
+    unlikely_seconds,
 )
 from hmpim.formats.readers.text.table import Lines, Table, open_table, read_columns
 from hmpim.record import Finding, Series
@@ -174,7 +174,7 @@ def _clock(
         raise type(error)(f"{file!r}, {error}") from None
     if not stamps.told_by_size:
         first = np.empty(0) if unit or stamps.kind != "number" else stamps.seconds(cells)
-        slow = () if isinstance(first, int) else slow_seconds(clock.name, first)
+        slow = () if isinstance(first, int) else unlikely_seconds(clock.name, first)
         return clock, stamps, slow
     told = Finding(
         code="time_unit",
