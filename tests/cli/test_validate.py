@@ -50,6 +50,21 @@ def test_a_record_that_is_not_is_exit_1_and_says_why(folder, capsys, tmp_path):
     assert figures["passed"] is False
 
 
+def test_a_record_is_read_as_identify_reads_it(folder, capsys, tmp_path):
+    rows = [line.split(",") for line in (folder / "right.csv").read_text().splitlines()[2:]]
+    bare = 2 * [f"{1000 * float(t)},{u},{y}" for t, u, y in rows]
+    log = tmp_path / "log.csv"
+    log.write_text("stamp,u,y\n" + "\n".join(bare) + "\n")
+    assert run("validate", folder / "old.json", log, "--time", "stamp [ms]") == 2
+    assert "choose one with --sweep N" in capsys.readouterr().err
+    words = ("--time", "stamp [ms]", "--sweep", "2")
+    assert run("validate", folder / "old.json", log, *words) == 0
+    assert "Passed." in capsys.readouterr().out
+    units = ("--unit", "u=deg", "--unit", "y=rad")
+    assert run("validate", folder / "old.json", log, *words, *units) == 2
+    assert "numbers are not converted" in capsys.readouterr().err
+
+
 def test_an_older_result_is_compared_within_both_bars(folder, capsys):
     assert run("validate", folder / "new.json", "--against", folder / "old.json") == 1
     shown = capsys.readouterr().out

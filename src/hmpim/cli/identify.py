@@ -20,6 +20,7 @@ from hmpim.cli.paging import (
     UnderTest,
     about_of,
     check_paper,
+    tables_in,
     write_beside,
 )
 from hmpim.cli.reading import (
@@ -187,7 +188,12 @@ def identify(
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},
-        writes={"--json": json, "--report": report, "--sign": sign},
+        writes={
+            "--json": json,
+            "--report": report,
+            "--sign": sign,
+            "--figures": tables_in(figures),
+        },
         folders={"--figures": figures},
     )
     check_paper(report, sign)
