@@ -28,6 +28,12 @@ class Watch:
         any, since a slow axis lags by nature.
     stale : float or None
         Seconds of the run without a new sample of a measured position; None for any.
+    late : float or None
+        Seconds by which a command of a rig that moves may go late: after a pause of the computer
+        those that are due would all go at once. None for any.
+    answer : float or None
+        Seconds after the last command of a block is due within which a rig that moves must return
+        from `play`; None for any.
 
     Raises
     ------
@@ -43,9 +49,11 @@ class Watch:
     margin: float = 0.1
     following_error: float | None = None
     stale: float | None = 0.5
+    late: float | None = 0.5
+    answer: float | None = 5.0
 
     def __post_init__(self) -> None:
-        for name in ("margin", "following_error", "stale"):
+        for name in ("margin", "following_error", "stale", "late", "answer"):
             value = getattr(self, name)
             if value is None and name != "margin":
                 continue
