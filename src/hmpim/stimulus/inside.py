@@ -86,7 +86,9 @@ def _peaks_sent(stimulus: Stimulus, samples: int) -> tuple[float, float, float, 
     """
     fs = stimulus.fs
     x = stimulus.motion(np.arange(-1, samples) / fs).position
-    rounding = 4.0 * float(np.spacing(np.abs(x).max()))
+    peak = stimulus.peaks.velocity
+    late = peak * float(np.spacing(samples / fs)) if math.isfinite(peak) else 0.0
+    rounding = 4.0 * float(np.spacing(np.abs(x).max())) + late  # of positions, and of their times
     rate = float(np.abs(np.diff(x)).max()) - rounding
     bend = float(np.abs(np.diff(x[2:], 2)).max()) - 2.0 * rounding if x.size > 4 else 0.0
     return float(np.abs(x).max()), rate * fs, bend * fs * fs, 0.0
