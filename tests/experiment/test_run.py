@@ -280,6 +280,18 @@ def test_a_stop_that_fails_with_what_came_before_says_the_cause_first():
     assert isinstance(failure.value.__cause__, RigError)
 
 
+def test_what_fails_on_leaving_hides_no_error_and_costs_no_record():
+    class Broken(Spy):
+        def __exit__(self, *_):
+            raise OSError("the port is closed already")
+
+    log = RunLog()
+    assert run(Broken(), SINE, log=log).samples == 200
+    assert "disconnecting failed: OSError: the port is closed already" in log.text()
+    with pytest.raises(RigError, match=r"cable pulled$"):
+        run(Broken(fault=OSError("cable pulled")), SINE)
+
+
 def test_ctrl_c_during_a_stop_waits_until_the_rig_stands():
     class Slow(Spy):
         def stop(self):

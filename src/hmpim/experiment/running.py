@@ -90,7 +90,7 @@ class Running:
         if self.options.clock is not None and isinstance(self.rig, Clocked):
             self.rig.use_clock(self.options.clock)
         try:
-            with self.rig:
+            with self._connected():
                 with self._faults_logged():
                     ready = self._check(self._stimuli())
                 findings: list[Finding] = []
@@ -108,6 +108,22 @@ class Running:
             raise RigError(
                 f"rig {self.rig.name!r} failed: {type(error).__name__}: {error}"
             ) from error
+
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        """Enter the rig, and leave it; what fails there hides no error and costs no record."""
+        self.rig.__enter__()
+        cause: BaseException | None = None
+        try:
+            yield
+        except BaseException as error:
+            cause = error
+            raise
+        finally:
+            try:
+                self.rig.__exit__(type(cause) if cause else None, cause, None)
+            except Exception as error:
+                self.log.add("fault", f"disconnecting failed: {_words(error)}")
 
     def _stimuli(self) -> dict[str, Stimulus]:
         return stimuli_by_axis(self.given, self.rig.axes, name=repr(self.rig.name))

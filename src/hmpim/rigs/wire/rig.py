@@ -117,8 +117,10 @@ class WireRig:
         trace: TracebackType | None,
         /,
     ) -> None:
-        self._say(Kind.BYE)
-        self._transport.close()
+        try:
+            self._say(Kind.BYE)
+        finally:
+            self._transport.close()
 
     def prepare(self, stimulus: Stimuli, /) -> Layout:
         """Check the rate and send the far end to its start; it moves there slowly.
@@ -372,7 +374,12 @@ def _row(orders: tuple[FloatArray, FloatArray, FloatArray], k: int) -> Command:
 
 
 def expected_hello(
-    *, axes: tuple[str, ...], unit: str, rate: float | None, limits: LimitsOfAxes
+    *,
+    axes: tuple[str, ...],
+    unit: str,
+    rate: float | None,
+    limits: LimitsOfAxes,
+    watchdog: float | None = None,
 ) -> Hello:
     """Return what a rig file expects of the far end.
 
@@ -389,4 +396,5 @@ def expected_hello(
         units=tuple(unit for _ in axes) if unit else (),
         rate=rate,
         limits={} if limits is None else dict(limits),
+        watchdog=watchdog,
     )
