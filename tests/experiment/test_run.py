@@ -521,11 +521,21 @@ def nothing(block):
             Watch(following_error=0.5),
             r"y is 0\.5\d+ deg from its command at .* more than the following error 0\.5 deg",
         ),
-        (nothing, Watch(), r"no sample of y came for 0\.5\d* s; 'pitch' is stopped"),
+        (nothing, Watch(), r"no new sample of y came for 0\.5\d* s; 'pitch' is stopped"),
         (
             lambda b: b.position[:, 0] if b.time[0] < 1.0 else nothing(b),
             Watch(stale=0.3),
-            r"no sample of y came for 0\.3\d* s",
+            r"no new sample of y came for 0\.3\d* s",
+        ),
+        (  # a driver that returns the last sample again and again
+            lambda b: Samples(time=[min(b.time[-1], 1.0)], values=[0.5]),
+            Watch(),
+            r"no new sample of y came for 0\.5\d* s",
+        ),
+        (  # a clock that was set back
+            lambda b: Samples(time=b.time % 1.0, values=b.position[:, 0]),
+            Watch(),
+            r"no new sample of y came for 0\.5\d* s",
         ),
     ],
 )
@@ -553,6 +563,38 @@ def test_what_is_watched_and_still_allowed(read, watch):
     except RigError as error:
         assert "has 0 samples" in str(error)  # noqa: PT017
     assert rig.told.count("play") == 100
+
+
+def test_a_following_error_is_in_the_unit_of_the_axis_whatever_is_measured_in():
+    class InRadians(Measured):
+        unit = "rad"
+
+    rig = InRadians(lambda b: np.radians(0.7 * b.position[:, 0]))
+    with pytest.raises(RigError, match=r"y is 0\.5\d+ deg from its command"):
+        run(rig, SINE, options=RunOptions(watch=Watch(following_error=0.5)))
+    run(InRadians(rig.read), SINE, options=RunOptions(watch=Watch(following_error=0.7)))
+
+
+def test_what_cannot_be_watched_is_refused_before_anything_moves():
+    class WithoutCommand(Measured):
+        def prepare(self, stimulus):
+            layout = super().prepare(stimulus)
+            command = replace(layout.channels[0], axis=None, quantity=None, commanded=False)
+            return replace(layout, channels=(command, layout.channels[1]))
+
+    rig = WithoutCommand(lambda b: b.position[:, 0])
+    with pytest.raises(RigError, match=r"records no commanded position of axis ''; state one"):
+        run(rig, SINE, options=RunOptions(watch=Watch(following_error=0.5)))
+    assert rig.moved == []
+
+    class InVolts(Measured):
+        unit = "V"
+
+    rig = InVolts(lambda b: b.position[:, 0])
+    with pytest.raises(UnitError, match="unit 'V' cannot be turned into 'deg'"):
+        run(rig, SINE)
+    assert rig.moved == []
+    assert rig.told[-2:] == ["stop", "exit"]
 
 
 def test_a_run_may_be_ended_early_for_a_reason():

@@ -223,7 +223,12 @@ class Running:
         recorder.open(layout, collected, band=shared_band(ready.stimuli))
         self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
         watcher = Watcher(
-            self.options.watch, ready.limits, name=self.rig.name, real=moves(self.rig)
+            self.options.watch,
+            ready.limits,
+            layout=layout,
+            units=dict(zip(commands.axes, commands.units, strict=True)),
+            name=self.rig.name,
+            real=moves(self.rig),
         )
         sure = self._sure(ready, layout)
         size = max(1, round(_BLOCK * commands.fs))
