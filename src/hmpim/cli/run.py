@@ -60,7 +60,8 @@ def run(
             "-o",
             "--output",
             metavar="FILE",
-            help="File for the record. An .h5 file is written during the run and survives a kill.",
+            help="File for the record, written during the run; a kill leaves an .h5 file as it is, "
+            "and of others FILE.partial.h5.",
         ),
     ] = None,
     until: Annotated[

@@ -142,8 +142,8 @@ class Running:
 
     def _felt(self, ready: _Ready, how: Feel, findings: list[Finding]) -> _Ready:
         """Move a little first, and return what may be moved then."""
-        grows = self.path is not None and self._recorder(ready, path=self.path).grows
-        feeling = replace(self, until=None, subscribers=(), path=self.path if grows else None)
+        grows = self._recorder(ready, path=self.path).growing
+        feeling = replace(self, until=None, subscribers=(), path=grows)
 
         def play(stimuli: Mapping[str, Stimulus]) -> Record:
             with self._faults_logged():
@@ -177,10 +177,15 @@ class Running:
             record = self._played(ready, findings, recorder)
         except BaseException as error:
             with undisturbed():
-                if recorder.fail(_words(error)):
-                    self.log.add("kept", f"what was recorded until then is in {self.path}")
+                kept = recorder.fail(_words(error))
+                if kept is not None:
+                    self.log.add("kept", f"what was recorded until then is in {kept}")
             raise
-        recorder.finish(record)
+        try:
+            recorder.finish(record)
+        except HmpimError:
+            self.log.add("kept", f"what was recorded is in {recorder.growing}")
+            raise
         return record
 
     def _played(self, ready: _Ready, findings: list[Finding], recorder: Recorder) -> Record:
