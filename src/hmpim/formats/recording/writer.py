@@ -280,7 +280,8 @@ class RecordWriter:
             return _held(path.open("r+b", buffering=0)), places, log_at
         except OSError as error:
             path.unlink(missing_ok=True)
-            raise ArgumentError(f"{str(self._path)!r} cannot be written: {error}") from error
+            reason = error.strerror or error
+            raise ArgumentError(f"{str(self._path)!r} cannot be written: {reason}") from error
 
     def _write(self, name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         place = self._places[name]
