@@ -137,6 +137,33 @@ def test_of_two_runs_begun_at_once_the_later_one_ends_and_the_first_is_kept(tmp_
     assert sorted(p.name for p in tmp_path.iterdir()) == ["r.h5"]
 
 
+@pytest.mark.parametrize("step", [-1.5, -0.2, 1e6])
+def test_a_clock_that_is_set_in_mid_run_ends_it_and_what_was_before_can_be_read(tmp_path, step):
+    class Set(Failing):
+        def play(self, block):
+            time = block.time if block.time[0] < 3.0 else block.time + step
+            return {name: Samples(time=time, values=np.array(block.position[:, 0]))
+                    for name in ("u", "y")}  # fmt: skip
+
+    rig = Set()
+    with pytest.raises(RigError, match=r"clock of 'u' was set: a sample at 2\.995 s is followed"):
+        run(rig, SWEEP, path=tmp_path / "r.h5")
+    assert rig.told == ["prepare", "stop", "exit"]
+    assert read_recording(tmp_path / "r.h5").record.samples == 600
+
+
+def test_a_single_damaged_stamp_ends_no_run(tmp_path):
+    class Damaged(Failing):
+        def play(self, block):
+            time = np.where(block.time == 3.0, 1e9, block.time)
+            return {name: Samples(time=time, values=np.array(block.position[:, 0]))
+                    for name in ("u", "y")}  # fmt: skip
+
+    record = run(Damaged(), SWEEP, path=tmp_path / "r.h5")
+    assert record.samples == SWEEP.samples - 1
+    assert "stray_stamps" in {finding.code for finding in record.findings}
+
+
 @pytest.mark.parametrize(
     "fault", [OSError("cable"), KeyboardInterrupt(), SystemExit(143), ZeroDivisionError()]
 )

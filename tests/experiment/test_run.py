@@ -532,11 +532,6 @@ def nothing(block):
             Watch(),
             r"no new sample of y came for 0\.5\d* s",
         ),
-        (  # a clock that was set back
-            lambda b: Samples(time=b.time % 1.0, values=b.position[:, 0]),
-            Watch(),
-            r"no new sample of y came for 0\.5\d* s",
-        ),
     ],
 )
 def test_what_is_watched_while_it_moves(read, watch, words):
