@@ -205,6 +205,33 @@ def test_a_stimulus_at_another_rate_is_refused_before_anything_moves():
     assert State.ARMED not in network.states
 
 
+def test_a_heavy_axis_is_waited_for_while_it_says_that_it_brakes():
+    """From 150 deg/s with 45 deg/s² it takes more than 3 s."""
+    heavy = Limits(position=900.0, velocity=200.0, acceleration=45.0, unit="deg")
+    far = FarEnd(replace(hello(axes=("roll",)), limits={"roll": heavy}))
+    slow = design(
+        band=(0.03, 0.06), duration=40, fs=500, axis="roll", extinction=0.0,
+        limits=Limits(velocity=150, acceleration=44, unit="deg"),
+    )  # fmt: skip
+    clock = ManualClock()
+    network = Network(clock, far)
+    fast = float(slow.time[np.argmax(np.abs(slow.velocity))])
+
+    def end(played):
+        if played.block.time[-1] > fast:
+            raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        run(
+            WireRig(transport=network, clock=clock),
+            slow,
+            subscribers=[end],
+            options=RunOptions(clock=clock),
+        )
+    assert network.farend.state in (State.AT_REST, State.IDLE)
+    assert not network.orders[-1].velocity.any()
+
+
 class Unplugged(Network):
     """A line whose port is gone after a while: sending and receiving fail."""
 

@@ -46,7 +46,7 @@ class WireRig:
     answer : float
         Seconds in which a far end must answer a question.
     homing : float
-        Seconds in which it must have gone to its start.
+        Seconds in which it must have gone to its start, or come to rest.
     stale : float
         Seconds without a response after which the run is given up.
     """
@@ -189,7 +189,7 @@ class WireRig:
         return account.take(everything=block.last)
 
     def stop(self) -> None:
-        """Tell the far end to brake, until it says that it stands.
+        """Tell the far end to brake, until it says that it stands; braking may take its time.
 
         Raises
         ------
@@ -198,7 +198,8 @@ class WireRig:
         """
         if self._stated is None:
             return
-        deadline = self._clock.now() + self._answer
+        begun = self._clock.now()
+        deadline = begun + self._answer
         while self._clock.now() < deadline:
             before = self._heard
             self._say(Kind.STOP)
@@ -207,6 +208,8 @@ class WireRig:
                 pass
             if self._heard > before and self._state in _STANDING:
                 return
+            if self._heard > before and self._state is State.BRAKING:
+                deadline = min(self._heard + self._answer, begun + self._homing)
         watchdog = self.watchdog
         braking = (
             f"its watchdog brakes it after {watchdog:g} s of silence"
@@ -215,7 +218,7 @@ class WireRig:
         )
         raise RigError(
             f"{self.name!r} at {self._transport.name} was told to stop and did not confirm within "
-            f"{self._answer:g} s that it stands still; {braking}"
+            f"{deadline - begun:.3g} s that it stands still; {braking}"
         )
 
     def report(self) -> RunReport:
