@@ -249,4 +249,6 @@ class Mounted:
 
 def _stamped(given: ArrayLike | Samples, block: Block) -> Samples:
     """Samples of an encoder, at the times of the block where they bring none."""
-    return given if isinstance(given, Samples) else Samples(time=block.time, values=given)
+    if isinstance(given, Samples):
+        return given
+    return Samples(time=block.time, values=np.asarray(given, dtype=np.float64))
