@@ -14,7 +14,7 @@ from hmpim.formats.recording import read_recording
 from hmpim.rigs import SystemClock
 from hmpim.stimulus import Limits, Sine, Stimulus
 
-LIMITS = Limits(position=3.0, velocity=20.0, acceleration=100.0, unit="deg")
+LIMITS = Limits(position=3.0, velocity=20.0, acceleration=2000.0, unit="deg")
 SINE = Stimulus(waveform=Sine(amplitude=2.0, frequency=1.0, duration=2.0), fs=100.0, unit="deg")
 
 

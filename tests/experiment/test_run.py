@@ -157,6 +157,21 @@ def test_what_is_designed_inside_limits_never_counts_as_a_jump(lead, extinction,
     assert len(spy.moved) == 1
 
 
+def test_what_moves_does_not_start_with_a_velocity_step_beyond_its_acceleration():
+    """The printed sweep, without a lead, is for simulations."""
+    limits = Limits(position=10, velocity=1000, acceleration=4000, unit="deg")
+    printed = design(band=(0.1, 10), duration=4, fs=500, limits=limits, lead=0)
+    simulated, real = Spy(limits=limits), Spy(limits=limits, moves=True)
+    run(simulated, printed)
+    said = (
+        r"starts in motion: its first commands take \d+.* beyond the limit 4000 deg/s² of 'pitch'"
+    )
+    with pytest.raises(LimitsError, match=said):
+        run(real, printed)
+    assert real.moved == []
+    run(real, design(band=(0.1, 10), duration=4, fs=500, limits=limits))
+
+
 def test_a_stimulus_designed_onto_the_limits_of_a_rig_is_played_by_it():
     limits = Limits(position=10, velocity=500, acceleration=8000, unit="deg")
     stimulus = design(band=(0.1, 20), duration=5, fs=200, limits=limits)
@@ -480,7 +495,7 @@ class Measured(Spy):
     """A real axis whose encoder is read."""
 
     def __init__(self, read, **kwargs):
-        limits = Limits(position=3.0, velocity=20.0, acceleration=100.0, unit="deg")
+        limits = Limits(position=3.0, velocity=20.0, acceleration=2000.0, unit="deg")
         super().__init__(moves=True, limits=limits, **kwargs)
         self.read = read
 
