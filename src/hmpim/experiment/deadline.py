@@ -59,11 +59,13 @@ class Deadline:
         self._main = threading.current_thread() is threading.main_thread()
         if self._main:
             self._before = signal.signal(signal.SIGINT, self._came)
-        threading.Thread(target=self._watch, daemon=True, name="deadline").start()
+        self._thread = threading.Thread(target=self._watch, daemon=True, name="deadline")
+        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
+        self._thread.join(_AGAIN)  # not for ever: what it called instead may hang, too
         if self._main and self._before is not None:
             signal.signal(signal.SIGINT, self._before)
 
