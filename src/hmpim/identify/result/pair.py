@@ -11,6 +11,7 @@ from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
 from hmpim.identify.result.plain import Plain, by_fields, plain
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
@@ -62,7 +63,8 @@ class PairIdentification(ByValue, Plain):
     and `residual` (shape (n,), the output's unit) are on the record's own uniform clock `time`;
     they follow from the record, and are part neither of the JSON nor of equality. `from_response`
     holds bandwidths read off the measured response, for comparison with the model's.
-    `nonlinearity` is None where the output does not follow the input at all. `stopping` says that
+    `nonlinearity` is None where the output does not follow the input at all. `nonlinear_part` is
+    what the model includes of it, and None where the model is linear. `stopping` says that
     the run ended early because the result was certain.
     """
 
@@ -86,6 +88,7 @@ class PairIdentification(ByValue, Plain):
     nonlinearity: Nonlinearity | None = None
     covariance: Real | None = None
     stopping: Stopping | None = None
+    nonlinear_part: NonlinearPart | None = None
 
     def __repr__(self) -> str:
         known = dict(_known(self.parameters))
@@ -121,6 +124,7 @@ class PairIdentification(ByValue, Plain):
             },
             "candidates": plain(self.candidates),
             "nonlinearity": plain(self.nonlinearity),
+            "nonlinear_part": plain(self.nonlinear_part),
             "verdict": self.verdict,
             "warnings": plain(self.warnings),
             "stopping": plain(self.stopping),
