@@ -256,7 +256,8 @@ def run_chain(chain: Chain, u: _Real, *, rng: np.random.Generator | None = None)
     if readout.hold_period is None:
         reading = base + played.output
         if nonlinear is not None:
-            reading = reading + nonlinear.effect(u, reading - readout.bias)
+            x = reading - readout.bias
+            reading = reading + nonlinear.effect(u, x, chain.level * rest)
     else:
         newest, index = _readings(chain, u.size)
         reading = base + _between(chain, played, newest)

@@ -13,6 +13,7 @@ from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 
 __all__ = [
+    "command_step",
     "gap_crossed",
     "play",
     "power_of",
@@ -113,14 +114,22 @@ def rubbed(
     at = np.arange(fine.size)
     command = gain * np.interp(at - FINE * delay, at, fine, left=fine[0])
     between = 0.5 * (command[:-1] + command[1:])
-    (_, damping, inertia), still = denominator, command[0]
-    rates = np.array([[0.0, 1.0, 0.0], [-1.0, -damping, 1.0], [0.0, 0.0, 0.0]])
-    rates[1] /= inertia
-    step = scipy.linalg.expm(rates / FINE)[:2]
+    step, still = command_step(denominator), command[0]
     top, below = scipy.signal.ss2tf(step[:, :2], step[:, 2:], np.eye(1, 2), np.zeros((1, 1)))
     free = scipy.signal.lfilter(top[0], below, np.append(between, command[-1]) - still) + still
-    held, moves = stick_slip(step, between, still, force, inertia)
+    held, moves = stick_slip(step, between, still, force, float(denominator[2]))
     return held, free, moves
+
+
+def command_step(denominator: _Real) -> _Real:
+    """Step of position and speed of a second-order unit on the finer clock, (2, 3).
+
+    It multiplies position, speed and the command, which is held over the step.
+    """
+    _, damping, inertia = denominator
+    rates = np.array([[0.0, 1.0, 0.0], [-1.0, -damping, 1.0], [0.0, 0.0, 0.0]])
+    rates[1] /= inertia
+    return np.asarray(scipy.linalg.expm(rates / FINE)[:2])
 
 
 def stick_slip(

@@ -53,13 +53,16 @@ class SteppedPart:
             return np.asarray(u - np.clip(u, -self.part.size, self.part.size))
         return u
 
-    def effect(self, u: _Real, x: _Real) -> _Real:
-        """What is added to the output of the linear part, (n,), less its bias."""
+    def effect(self, u: _Real, x: _Real, rest: float) -> _Real:
+        """What is added to the output of the linear part, (n,), less its bias.
+
+        Before the first sample the linear part was at `rest`.
+        """
         part = self.part
         if part.at == "command":
             return np.zeros(x.size)
         if part.kind == "backlash":
-            return play(x, part.size) - x
+            return play(np.append(rest, x), part.size)[1:] - x
         if part.kind == "friction":
             return friction(part, self.system, finely(u, part.between), self.fs)
         if part.at == "force":
