@@ -244,8 +244,8 @@ def friction(part: NonlinearPart, system: RationalDelay, fine: _Real, fs: float)
     below, above = system.denominator, system.numerator
     if below.size != 3 or above.size != 1 or below[0] == 0.0:
         raise ArgumentError(
-            "friction acts within a second-order unit without zeros, and this model has "
-            f"{below.size - 1} poles and {above.size - 1} zeros"
+            "friction acts within a second-order unit without zeros; the denominator here is of "
+            f"degree {below.size - 1}, the numerator of degree {above.size - 1}"
         )
     held, free, _ = rubbed(
         fine,

@@ -47,7 +47,9 @@ def with_nonlinear_part(source: Source, to: str) -> tuple[Source, str | None]:
         said = f"{LINEAR_PART}it omits {part.words} ({size})."
         linear = replace(source.model, nonlinear=None)
         return replace(source, model=linear, note=said), said
-    return replace(source, note=f"The file includes {part.words} ({size}){_how(source, part, to)}"), None
+    return replace(
+        source, note=f"The file includes {part.words} ({size}){_how(source, part, to)}"
+    ), None
 
 
 def _size(part: NonlinearPart, unit: str) -> str:

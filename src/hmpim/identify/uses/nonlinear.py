@@ -62,7 +62,7 @@ def applied(
             message=f"{pair.input!r} {what} up to {f'{farthest:.4g} {unit}'.rstrip()}, and "
             f"{part.words} was identified from a record of up to {part.reach:.4g}: beyond, the "
             "prediction is an extrapolation. Identify a record of this amplitude too.",
-            severity="doubt",
+            severity="info",
             parameters=(),
         ),
     )
@@ -85,6 +85,6 @@ def _linear_only(pair: PairIdentification, reason: str) -> Finding:
         code="linear_only",
         message=f"The prediction of {pair.output!r} from {pair.input!r} is that of the linear part "
         f"alone: {reason}.",
-        severity="doubt",
+        severity="info",
         parameters=(),
     )
