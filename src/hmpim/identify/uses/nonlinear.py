@@ -1,5 +1,6 @@
 """The nonlinear part of a model under another input: whether it can be applied, and how far."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,9 @@ from hmpim.identify.worth import FEW
 from hmpim.model import Model, simulate
 from hmpim.model.nonlinear import KIND_WORDS, excursion
 from hmpim.model.operators import gap_crossed
-from hmpim.record import Finding
+from hmpim.record import Aligned, Finding
 
-__all__ = ["applied", "known_state", "left_out"]
+__all__ = ["all_applied", "applied", "known_state", "left_out"]
 
 
 def left_out(pair: PairIdentification) -> str | None:
@@ -66,6 +67,24 @@ def applied(
             parameters=(),
         ),
     )
+
+
+def all_applied(
+    pairs: Sequence[PairIdentification], models: Sequence[Model], aligned: Aligned
+) -> tuple[list[Model], Mask, tuple[Finding, ...]]:
+    """The models of an output as a record can drive them, the samples, (n,), and the findings.
+
+    The samples are those at which all inputs and the states of the nonlinear parts are known.
+    """
+    driven: list[Model] = []
+    known, said = np.ones(aligned.samples, dtype=bool), list[Finding]()
+    for pair, model in zip(pairs, models, strict=True):
+        source = aligned.signal(pair.input)
+        able, findings = applied(pair, model, source.values, aligned.fs)
+        driven.append(able)
+        said += findings
+        known &= source.valid & known_state(able, source.values, aligned.fs)
+    return driven, known, tuple(said)
 
 
 def known_state(model: Model, u: Real, fs: float) -> Mask:

@@ -18,7 +18,7 @@ from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.uses.nonlinear import applied, known_state
+from hmpim.identify.uses.nonlinear import all_applied
 from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
@@ -291,16 +291,9 @@ def _validated(
 ) -> OutputValidation:
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
-    driving = [
-        applied(pair, to_model(pair, fs=fs), aligned.signal(pair.input).values, aligned.fs)
-        for pair in pairs
-    ]
-    models = [model for model, _ in driving]
+    models, known, findings = all_applied(pairs, [to_model(pair, fs=fs) for pair in pairs], aligned)
     wait = max(settling_time(model) for model in models)
-    scored = y.valid & (aligned.time >= aligned.start + wait)
-    for pair, model in zip(pairs, models, strict=True):
-        source = aligned.signal(pair.input)
-        scored &= source.valid & known_state(model, source.values, aligned.fs)
+    scored = y.valid & known & (aligned.time >= aligned.start + wait)
     if models[0].hold_period is not None:
         held = detect_hold(y.values, aligned.fs)  # the phase of its clock is the record's own
         if held is not None:
@@ -345,7 +338,7 @@ def _validated(
             *_size(residual[scored], noise, model_std[scored], std[scored], bounds, unit=y.unit),
             *_tests(aligned, pairs, models, residual, scored, model_std, bounds),
         ),
-        findings=tuple(finding for _, findings in driving for finding in findings),
+        findings=findings,
     )
 
 
