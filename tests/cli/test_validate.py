@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from nonlinear_predictions import chirp, moved, recorded
 from scipy.signal import lfilter
 
 import hmpim
@@ -109,3 +110,15 @@ def test_a_filter_read_back_from_its_file_is_held_against_another_record(tmp_pat
     hmpim.save(found, tmp_path / "r.json")
     assert run("validate", tmp_path / "r.json", tmp_path / "b.csv") != 2
     assert "fs = None" not in capsys.readouterr().err
+
+
+def test_an_input_beyond_the_identified_amplitude_is_said(capsys, tmp_path):
+    within, beyond = chirp(), chirp(1.4)
+    hmpim.save(hmpim.identify(recorded(within, moved("backlash", within), 1)), tmp_path / "r.json")
+    hmpim.save(recorded(beyond, moved("backlash", beyond), 2), tmp_path / "loud.csv")
+    words = ("--json", tmp_path / "v.json")
+    assert run("validate", tmp_path / "r.json", tmp_path / "loud.csv", *words) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "'u' moves the output by up to 2.85" in shown
+    (output,) = json.loads((tmp_path / "v.json").read_text())["outputs"]
+    assert [finding["code"] for finding in output["findings"]] == ["beyond_reach"]

@@ -429,6 +429,9 @@ def _predictions(result: "Identification", data: "Record", split: float) -> list
         if not has_model(pair):
             notes.append(f"{name}: no model to predict with.")
             continue
-        fit = predict(pair, data, start=split).fit_percent
-        notes.append(f"{name}: predicted from {split:.4g} s on with a fit of {fit:.2f} %.")
+        found = predict(pair, data, start=split)
+        notes.append(
+            f"{name}: predicted from {split:.4g} s on with a fit of {found.fit_percent:.2f} %."
+        )
+        notes += [finding.message for finding in found.findings]
     return notes

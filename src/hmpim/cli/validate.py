@@ -110,6 +110,9 @@ def validate(
             validation = check(found, data, bounds=bounds)
         figures |= validation.to_dict()
         output_console().print(_checks(validation))
+        for output in validation.outputs:
+            for finding in output.findings:
+                output_console().print(finding.message)
     if against is not None:
         changes = compare(found, read_result(against))
         changed = any(change.changed for change in changes)
