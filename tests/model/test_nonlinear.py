@@ -66,10 +66,11 @@ def test_step_by_step_a_force_is_the_fixed_point_of_its_row(denominator):
     parts = [driven(model.system, source, FS, early=k / FINE) for k in range(FINE)]
     x = np.stack(parts, axis=1).ravel()[: 1 - FINE]
     below = model.system.denominator * FS ** np.arange(len(denominator))
+    slower = below * FINE ** np.arange(len(denominator))
     bend = part("hardening", "force", 0.1)
     z = x.copy()
     for _ in range(200):  # a fixed point by small steps
-        z += 0.3 * (x - 0.1 * pushed(power_of(z, 3, 2.0), below) - z)
+        z += 0.3 * (x - 0.1 * pushed(power_of(z, 3, 2.0), slower) - z)
     assert forced(bend, below, x) == pytest.approx((z - x)[::FINE], abs=1e-7)
 
 
