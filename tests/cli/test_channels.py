@@ -81,7 +81,9 @@ def test_a_file_without_time_is_listed_and_says_what_it_needs(tmp_path):
     done = run("channels", path)
     assert done.exit_code == 0
     assert "no time" in done.stdout
-    assert "name it with --time, or give the rate with --fs" in " ".join(done.stdout.split())
+    assert "yet: no time is known; name it with --time, or give the rate with --fs" in " ".join(
+        done.stdout.split()
+    )
     done = run("channels", path, "--fs", 10)
     assert re.search(r"a +– +10 Hz +0 to 5\.9 s", done.stdout)
 
@@ -145,3 +147,14 @@ def test_rows_whose_newest_sample_comes_first_are_said_to_run_backward(log):
     done = run("identify", log, "--input", "cmd", "--output", "gyro")
     assert done.exit_code == 2
     assert "runs backward from the first sample (11.995 s) to the last (0 s)" in done.stderr
+
+
+def test_a_file_of_two_recordings_says_how_one_is_taken(tmp_path):
+    path = tmp_path / "two.csv"
+    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(200))
+    path.write_text("time,u,y\n" + rows + rows)
+    said = " ".join(run("channels", path).stdout.split())
+    assert (
+        "u, y: time starts again, so that there are 2 recordings; take one with --sweep N" in said
+    )
+    assert "Time starts again, so no input and output are proposed" in said

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nonlinear_predictions import chirp, moved, recorded
 
 import hmpim
 from hmpim.cli.main import app
@@ -86,3 +87,21 @@ def test_a_result_is_not_replaced_by_its_export(result, capsys, tmp_path):
     (tmp_path / "r.csv").write_text("time,u,y\n0,0,0\n1,1,1\n2,0,1\n")
     assert run("export", tmp_path / "r.csv", "--to", "c", "-o", tmp_path / "x") == 2
     assert "holds nothing that hmpim.save writes" in capsys.readouterr().err
+
+
+def test_a_nonlinearity_that_a_target_lacks_is_said(tmp_path, capsys):
+    drive = chirp()
+    found = hmpim.identify(recorded(drive, moved("backlash", drive), 1))
+    hmpim.save(found, tmp_path / "r.json")
+    assert run("export", tmp_path / "r.json", "--to", "csv", "-o", tmp_path / "m.csv") == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert (
+        "m.csv: The file holds the linear part alone: it omits backlash (half the gap is" in shown
+    )
+    assert run("export", tmp_path / "r.json", "--to", "python", "-o", tmp_path / "m.py") == 0
+    assert "omits" not in capsys.readouterr().out
+    t = np.arange(drive.samples) / drive.fs
+    truth = hmpim.to_model(found["y", "u"], fs=drive.fs).simulate(drive.sampled(), t)
+    stepped = runpy.run_path(str(tmp_path / "m.py"))["simulate"](drive.sampled())
+    assert stepped == pytest.approx(truth, abs=1e-9)
+    assert np.std(stepped - moved("backlash", drive)) < 0.005

@@ -43,6 +43,7 @@ def test_to_files_with_a_picture_of_the_trade(tmp_path):
     assert errors["ci95"] <= errors["worst_ci95"] <= 0.017 * 11 * 1.001
     assert data["errors"]["delay"]["ci95"] <= 0.005
     assert "Predicted errors at 95 %" in out.output
+    assert "0.153 to 0.187" in out.output  # of 9 and of 11 Hz; the worst is at the upper end
     assert f"{data['value']:.4g}" in out.output
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     values = [p["value"] for p in data["trade"] if p["value"] is not None]

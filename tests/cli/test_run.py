@@ -74,6 +74,7 @@ def test_from_a_file_to_the_record_the_result_and_the_page(folder):
         ),
         (["--rig-file", "rig.toml", "s.csv", "--json", "rig.toml"], "is the rig's file itself"),
         (["--rig", "eye", "s.csv", "-o", "r.doc"], "-o r.doc must end in one of .h5, .hdf5, .csv"),
+        (["--rig", "eye", "s.csv", "--json", "r.txt"], "--json r.txt must end in .json"),
         (["--rig", "eye", "s.csv", "-o", "no/r.csv"], "folder no does not exist"),
         (["--rig", "eye", "none.csv", "-o", "r.csv"], "there is no file 'none.csv'"),
         (["--rig", "eel", "s.csv", "-o", "r.csv"], "there is no rig 'eel'; there are eye,"),

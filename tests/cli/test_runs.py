@@ -1,6 +1,7 @@
 """`hmpim runs`: records and results of a folder joined, filtered and compared."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -102,6 +103,42 @@ def test_bad_input_is_one_line(folder, tmp_path):
     done = run("runs", folder, "--where", "name = alone*", "--compare")
     assert done.exit_code == 2
     assert "0 of these runs have a result" in done.stderr
+
+
+def test_no_run_is_overwritten_by_the_list_of_runs(tmp_path):
+    record = bench(0.05, 1)
+    hmpim.save(record, tmp_path / "a.h5")
+    hmpim.save(hmpim.identify(record), tmp_path / "a.json")
+    (tmp_path / "torn.h5").write_bytes((tmp_path / "a.h5").read_bytes()[:1500])
+    for name in ("a.h5", "a.json", "torn.h5"):
+        before = (tmp_path / name).read_bytes()
+        done = run("runs", tmp_path, "--json", tmp_path / name)
+        assert done.exit_code == 2
+        assert "is one of the runs itself, which would be lost" in done.stderr
+        assert (tmp_path / name).read_bytes() == before
+
+
+def test_a_list_of_runs_is_no_run_and_can_be_written_again(tmp_path):
+    record = bench(0.05, 1)
+    hmpim.save(hmpim.identify(record), tmp_path / "a.json")
+    for _ in range(2):
+        done = run("runs", tmp_path, "--json", tmp_path / "runs.json")
+        assert done.exit_code == 0, done.stderr
+        assert "cannot be read" not in done.stdout
+
+
+def test_a_run_of_other_channels_does_not_stop_the_comparison(tmp_path):
+    for name, delay in (("a", 0.05), ("c", 0.08)):
+        hmpim.save(hmpim.identify(bench(delay, 1)), tmp_path / f"{name}.json")
+    other = json.loads((tmp_path / "a.json").read_text())
+    other["pairs"][0]["input"] = "w"
+    (tmp_path / "b.json").write_text(json.dumps(other))
+    for age, name in enumerate("cba"):
+        os.utime(tmp_path / f"{name}.json", (1e9 - age, 1e9 - age))
+    done = run("runs", tmp_path, "--compare")
+    assert done.exit_code == 0, done.stderr
+    assert "b.json has no parameter in common with a.json" in done.stdout
+    assert "changed" in done.stdout
 
 
 def test_what_a_hidden_folder_holds_is_no_run(tmp_path):

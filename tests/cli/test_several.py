@@ -226,3 +226,15 @@ def test_levels_are_named_with_their_unit_and_a_doubtful_figure_is_marked(tmp_pa
     assert not sure.endswith("?")
     assert doubtful.endswith("\u00a0?")
     assert not doubtful.endswith("? ?")
+
+
+def test_what_is_refused_names_the_files(tmp_path):
+    y = output(U, natural=3.0, seed=1)
+    first = write(tmp_path / "a.csv", {"u": U, "y": y})
+    for name, columns, words in (
+        ("b.csv", {"u": U, "y": y}, "'a.csv' and 'b.csv' hold the same samples"),
+        ("c.csv", {"u": U[::-1], "y": y}, r"of 'c.csv' differs from that of 'a.csv' by \d+ %"),
+    ):
+        done = run(first, write(tmp_path / name, columns))
+        assert done.exit_code == 2
+        assert re.search(words, done.stderr), done.stderr

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from nonlinear_predictions import chirp, moved, recorded
 from scipy.signal import lfilter
 
 import hmpim
@@ -48,6 +49,21 @@ def test_a_record_that_is_not_is_exit_1_and_says_why(folder, capsys, tmp_path):
     failed = {c["name"] for c in figures["outputs"][0]["checks"] if not c["passed"]}
     assert "follows_input" in failed
     assert figures["passed"] is False
+
+
+def test_a_record_is_read_as_identify_reads_it(folder, capsys, tmp_path):
+    rows = [line.split(",") for line in (folder / "right.csv").read_text().splitlines()[2:]]
+    bare = 2 * [f"{1000 * float(t)},{u},{y}" for t, u, y in rows]
+    log = tmp_path / "log.csv"
+    log.write_text("stamp,u,y\n" + "\n".join(bare) + "\n")
+    assert run("validate", folder / "old.json", log, "--time", "stamp [ms]") == 2
+    assert "choose one with --sweep N" in capsys.readouterr().err
+    words = ("--time", "stamp [ms]", "--sweep", "2")
+    assert run("validate", folder / "old.json", log, *words) == 0
+    assert "Passed." in capsys.readouterr().out
+    units = ("--unit", "u=deg", "--unit", "y=rad")
+    assert run("validate", folder / "old.json", log, *words, *units) == 2
+    assert "numbers are not converted" in capsys.readouterr().err
 
 
 def test_an_older_result_is_compared_within_both_bars(folder, capsys):
@@ -94,3 +110,15 @@ def test_a_filter_read_back_from_its_file_is_held_against_another_record(tmp_pat
     hmpim.save(found, tmp_path / "r.json")
     assert run("validate", tmp_path / "r.json", tmp_path / "b.csv") != 2
     assert "fs = None" not in capsys.readouterr().err
+
+
+def test_an_input_beyond_the_identified_amplitude_is_said(capsys, tmp_path):
+    within, beyond = chirp(), chirp(1.4)
+    hmpim.save(hmpim.identify(recorded(within, moved("backlash", within), 1)), tmp_path / "r.json")
+    hmpim.save(recorded(beyond, moved("backlash", beyond), 2), tmp_path / "loud.csv")
+    words = ("--json", tmp_path / "v.json")
+    assert run("validate", tmp_path / "r.json", tmp_path / "loud.csv", *words) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "'u' moves the output by up to 2.85" in shown
+    (output,) = json.loads((tmp_path / "v.json").read_text())["outputs"]
+    assert [finding["code"] for finding in output["findings"]] == ["beyond_reach"]

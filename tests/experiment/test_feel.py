@@ -1,12 +1,14 @@
 """Feel before you push: how far an unknown rig is moved, and why no further."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.experiment import Feel, RunLog, RunOptions, run
 from hmpim.formats.recording import read_recording
-from hmpim.rigs import ManualClock
+from hmpim.rigs import ChannelSpec, Layout, ManualClock
 from hmpim.rigs.wire import WireRig
 from hmpim.stimulus import Limits, design, scaled_stimulus
 from wire_support import Lag, Network
@@ -79,6 +81,26 @@ def test_a_resonance_is_kept_inside_the_limit_on_what_is_measured():
     assert 0.9 * LIMITS.position < reached < 0.97 * LIMITS.position
     assert "would bring it to" in said.message
     assert rig.peaks[-1] < 0.8 * SWEEP.peaks.position
+
+
+def test_the_limit_of_the_only_axis_counts_whatever_its_channel_is_called():
+    class Lever(Arm):
+        axes = ("lever",)
+
+        def prepare(self, stimulus):
+            super().prepare(stimulus)
+            u, y = (ChannelSpec(name=name, role=role, unit="deg", axis="lever", quantity="position",
+                                commanded=role == "input")
+                    for name, role in (("u", "input"), ("y", "output")))  # fmt: skip
+            return Layout(channels=(u, y))
+
+        def play(self, block):
+            return {"y": super().play(block)}
+
+    rig = Lever(frequency=2.5, damping=0.15)
+    record = run(rig, replace(SWEEP, axis="lever"), options=RunOptions(feel=Feel()))
+    assert "would bring it to" in str(record.findings)
+    assert np.abs(record.outputs[0].values).max() < 0.97 * LIMITS.position
 
 
 def test_what_ends_to_be_linear_is_pushed_no_further():

@@ -19,7 +19,7 @@ from hmpim.identify import identify
 from hmpim.stimulus import Sine, Stimulus
 from tests_support import in_studies
 
-SHORT = Stimulus(waveform=Sine(amplitude=2.0, frequency=2.0, duration=0.5), fs=200.0, unit="deg")
+SHORT = Stimulus(waveform=Sine(amplitude=0.15, frequency=2.0, duration=0.5), fs=200.0, unit="deg")
 
 
 def traced(path):

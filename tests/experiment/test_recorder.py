@@ -4,19 +4,20 @@ import errno
 import os
 import shutil
 import signal
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, RecordError, RigError
-from hmpim.experiment import RunLog, run
+from hmpim.experiment import RunLog, recorder, run
 from hmpim.experiment.interrupt import AskedToEnd
 from hmpim.experiment.recorder import Recorder
 from hmpim.formats import load
-from hmpim.formats.recording import read_recording, writer
+from hmpim.formats.recording import RecordWriter, read_recording, writer
 from hmpim.identify import identify
-from hmpim.rigs import Sensor
+from hmpim.rigs import Samples, Sensor
 from hmpim.stimulus import Limits, design
 
 LIMITS = Limits(position=10, velocity=300, acceleration=5000, unit="deg")
@@ -72,6 +73,95 @@ def test_the_file_is_the_record_and_says_what_it_was_made_with(tmp_path):
 def test_a_file_of_another_kind_is_written_at_the_end(tmp_path):
     record = run(SENSOR, SWEEP, path=tmp_path / "r.csv", rng=1)
     assert load(tmp_path / "r.csv").sha256 == record.sha256
+
+
+def test_a_file_that_is_written_at_the_end_grows_beside_it_until_then(tmp_path):
+    """What a kill leaves."""
+    seen = []
+
+    def look(played):
+        if played.block.time[-1] > 3.0 and not seen:
+            seen.append(read_recording(tmp_path / "r.csv.partial.h5"))
+
+    record = run(SENSOR, SWEEP, path=tmp_path / "r.csv", rng=1, subscribers=[look])
+    (kept,) = seen
+    assert not kept.complete
+    count = kept.record.samples
+    assert count > 2.7 * SWEEP.fs
+    assert np.array_equal(kept.record.outputs[0].values, record.outputs[0].values[:count])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.csv"]
+
+
+def test_a_record_that_cannot_be_written_at_the_end_is_kept_beside(tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise ArgumentError("'r.csv' cannot be written: No space left on device")
+
+    monkeypatch.setattr(recorder, "save", full)
+    log = RunLog()
+    with pytest.raises(ArgumentError, match="No space left"):
+        run(SENSOR, SWEEP, path=tmp_path / "r.csv", rng=1, log=log)
+    assert log.events[-1].message.endswith("r.csv.partial.h5")
+    assert read_recording(tmp_path / "r.csv.partial.h5").record.samples == SWEEP.samples
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it does not replace a file that is open")
+@pytest.mark.parametrize("name", ["r.h5", "r.csv"])
+def test_a_second_run_onto_a_file_that_is_being_written_is_refused(tmp_path, name):
+    second, said = Failing(), []
+
+    def again(played):
+        if played.block.time[-1] > 1.0 and not said:
+            with pytest.raises(ArgumentError, match="is being written by another run") as refusal:
+                run(second, SWEEP, path=tmp_path / name)
+            said.append(str(refusal.value))
+
+    record = run(SENSOR, SWEEP, path=tmp_path / name, rng=1, subscribers=[again])
+    assert "prepare" not in second.told
+    assert load(tmp_path / name).sha256 == record.sha256
+    assert sorted(p.name for p in tmp_path.iterdir()) == [name]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it does not replace a file that is open")
+def test_of_two_runs_begun_at_once_the_later_one_ends_and_the_first_is_kept(tmp_path):
+    layout = SENSOR.prepare(SWEEP)
+    second = RecordWriter(tmp_path / "r.h5", layout, fs=200.0, samples=SWEEP.samples)
+
+    def theirs(played):
+        if played.block.start == 0:
+            with pytest.raises(ArgumentError, match="is being written by another run"):
+                second.append({"y": Samples(time=[0.0], values=[0.0])})
+
+    record = run(SENSOR, SWEEP, path=tmp_path / "r.h5", rng=1, subscribers=[theirs])
+    second.close(ended="refused")
+    assert load(tmp_path / "r.h5").sha256 == record.sha256
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["r.h5"]
+
+
+@pytest.mark.parametrize("step", [-1.5, -0.2, 1e6])
+def test_a_clock_that_is_set_in_mid_run_ends_it_and_what_was_before_can_be_read(tmp_path, step):
+    class Set(Failing):
+        def play(self, block):
+            time = block.time if block.time[0] < 3.0 else block.time + step
+            return {name: Samples(time=time, values=np.array(block.position[:, 0]))
+                    for name in ("u", "y")}  # fmt: skip
+
+    rig = Set()
+    with pytest.raises(RigError, match=r"clock of 'u' was set: a sample at 2\.995 s is followed"):
+        run(rig, SWEEP, path=tmp_path / "r.h5")
+    assert rig.told == ["prepare", "stop", "exit"]
+    assert read_recording(tmp_path / "r.h5").record.samples == 600
+
+
+def test_a_single_damaged_stamp_ends_no_run(tmp_path):
+    class Damaged(Failing):
+        def play(self, block):
+            time = np.where(block.time == 3.0, 1e9, block.time)
+            return {name: Samples(time=time, values=np.array(block.position[:, 0]))
+                    for name in ("u", "y")}  # fmt: skip
+
+    record = run(Damaged(), SWEEP, path=tmp_path / "r.h5")
+    assert record.samples == SWEEP.samples - 1
+    assert "stray_stamps" in {finding.code for finding in record.findings}
 
 
 @pytest.mark.parametrize(

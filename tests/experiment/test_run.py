@@ -157,6 +157,21 @@ def test_what_is_designed_inside_limits_never_counts_as_a_jump(lead, extinction,
     assert len(spy.moved) == 1
 
 
+def test_what_moves_does_not_start_with_a_velocity_step_beyond_its_acceleration():
+    """The printed sweep, without a lead, is for simulations."""
+    limits = Limits(position=10, velocity=1000, acceleration=4000, unit="deg")
+    printed = design(band=(0.1, 10), duration=4, fs=500, limits=limits, lead=0)
+    simulated, real = Spy(limits=limits), Spy(limits=limits, moves=True)
+    run(simulated, printed)
+    said = (
+        r"starts in motion: its first commands take \d+.* beyond the limit 4000 deg/s² of 'pitch'"
+    )
+    with pytest.raises(LimitsError, match=said):
+        run(real, printed)
+    assert real.moved == []
+    run(real, design(band=(0.1, 10), duration=4, fs=500, limits=limits))
+
+
 def test_a_stimulus_designed_onto_the_limits_of_a_rig_is_played_by_it():
     limits = Limits(position=10, velocity=500, acceleration=8000, unit="deg")
     stimulus = design(band=(0.1, 20), duration=5, fs=200, limits=limits)
@@ -278,6 +293,18 @@ def test_a_stop_that_fails_with_what_came_before_says_the_cause_first():
     with pytest.raises(RigError, match=said) as failure:
         run(pulled, SINE)
     assert isinstance(failure.value.__cause__, RigError)
+
+
+def test_what_fails_on_leaving_hides_no_error_and_costs_no_record():
+    class Broken(Spy):
+        def __exit__(self, *_):
+            raise OSError("the port is closed already")
+
+    log = RunLog()
+    assert run(Broken(), SINE, log=log).samples == 200
+    assert "disconnecting failed: OSError: the port is closed already" in log.text()
+    with pytest.raises(RigError, match=r"cable pulled$"):
+        run(Broken(fault=OSError("cable pulled")), SINE)
 
 
 def test_ctrl_c_during_a_stop_waits_until_the_rig_stands():
@@ -468,7 +495,7 @@ class Measured(Spy):
     """A real axis whose encoder is read."""
 
     def __init__(self, read, **kwargs):
-        limits = Limits(position=3.0, velocity=20.0, acceleration=100.0, unit="deg")
+        limits = Limits(position=3.0, velocity=20.0, acceleration=2000.0, unit="deg")
         super().__init__(moves=True, limits=limits, **kwargs)
         self.read = read
 
@@ -509,11 +536,16 @@ def nothing(block):
             Watch(following_error=0.5),
             r"y is 0\.5\d+ deg from its command at .* more than the following error 0\.5 deg",
         ),
-        (nothing, Watch(), r"no sample of y came for 0\.5\d* s; 'pitch' is stopped"),
+        (nothing, Watch(), r"no new sample of y came for 0\.5\d* s; 'pitch' is stopped"),
         (
             lambda b: b.position[:, 0] if b.time[0] < 1.0 else nothing(b),
             Watch(stale=0.3),
-            r"no sample of y came for 0\.3\d* s",
+            r"no new sample of y came for 0\.3\d* s",
+        ),
+        (  # a driver that returns the last sample again and again
+            lambda b: Samples(time=[min(b.time[-1], 1.0)], values=[0.5]),
+            Watch(),
+            r"no new sample of y came for 0\.5\d* s",
         ),
     ],
 )
@@ -541,6 +573,38 @@ def test_what_is_watched_and_still_allowed(read, watch):
     except RigError as error:
         assert "has 0 samples" in str(error)  # noqa: PT017
     assert rig.told.count("play") == 100
+
+
+def test_a_following_error_is_in_the_unit_of_the_axis_whatever_is_measured_in():
+    class InRadians(Measured):
+        unit = "rad"
+
+    rig = InRadians(lambda b: np.radians(0.7 * b.position[:, 0]))
+    with pytest.raises(RigError, match=r"y is 0\.5\d+ deg from its command"):
+        run(rig, SINE, options=RunOptions(watch=Watch(following_error=0.5)))
+    run(InRadians(rig.read), SINE, options=RunOptions(watch=Watch(following_error=0.7)))
+
+
+def test_what_cannot_be_watched_is_refused_before_anything_moves():
+    class WithoutCommand(Measured):
+        def prepare(self, stimulus):
+            layout = super().prepare(stimulus)
+            command = replace(layout.channels[0], axis=None, quantity=None, commanded=False)
+            return replace(layout, channels=(command, layout.channels[1]))
+
+    rig = WithoutCommand(lambda b: b.position[:, 0])
+    with pytest.raises(RigError, match=r"records no commanded position of axis ''; state one"):
+        run(rig, SINE, options=RunOptions(watch=Watch(following_error=0.5)))
+    assert rig.moved == []
+
+    class InVolts(Measured):
+        unit = "V"
+
+    rig = InVolts(lambda b: b.position[:, 0])
+    with pytest.raises(UnitError, match="unit 'V' cannot be turned into 'deg'"):
+        run(rig, SINE)
+    assert rig.moved == []
+    assert rig.told[-2:] == ["stop", "exit"]
 
 
 def test_a_run_may_be_ended_early_for_a_reason():

@@ -105,6 +105,51 @@ def test_a_single_slow_sweep_is_never_left_before_its_band_is_passed():
     assert record.stopping is None or record.stopping.time >= passes_band_at(slow) + 0.15
 
 
+def _lost(time, values):
+    return time, np.where(np.abs(time - 1.0) < 1e-9, np.nan, values)
+
+
+def _doubled(time, values):
+    return np.repeat(time, 2), np.repeat(values, 2)
+
+
+def _swapped(time, values):
+    return time[::-1], values[::-1]
+
+
+@pytest.mark.parametrize("spoilt", [_lost, _doubled, _swapped])
+def test_samples_that_a_record_mends_do_not_end_a_run_that_is_looked_at(spoilt):
+    class Spoilt:
+        name, axes, limits, moves = "spoilt", (), None, False
+
+        def __init__(self):
+            self.unit = sensor()
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def seed(self, rng):
+            self.unit.seed(rng)
+
+        def prepare(self, stimulus):
+            return self.unit.prepare(stimulus)
+
+        def play(self, block):
+            reply = self.unit.play(block)
+            time, values = spoilt(block.time, np.asarray(reply["y"]))
+            return {"u": reply["u"], "y": Samples(time=time, values=values)}
+
+        def stop(self):
+            self.unit.stop()
+
+    record = hmpim.run(Spoilt(), sweeps(), rng=1, until=RULE)
+    assert record.stopping is not None
+    assert len(record.findings) == 1
+
+
 def test_what_is_doubtful_or_not_there_is_never_enough():
     def known(**given):
         return Estimate(**{"value": 10.0, "std": 0.05, "ci95": None, "unit": "Hz", **given})

@@ -132,9 +132,25 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
         (b"time,u,y\n0,1,\x00\xfe\n", "is a binary file"),
         ("word\nword\nword\n", "holds no rows of numbers"),
         ('{"schema": "hmpim/identification/2"}\n', "holds JSON and .* with hmpim report"),
+        ('{"time":{"0":0.0,"1":0.1},"u":{"0":1,"1":2},"y":{"0":1,"1":3}}', "export the samples"),
+        ("[[0,1,2],[1,3,4],[2,5,6]]", "holds JSON and no table"),
         (
             "time,a,b\n0,1,2\n1,3,4\n",
             r"which column is the input; its columns are a, b: .*--input a",
+        ),
+        ("time,u\n0,1\n1,3\n", "has no column for the output; its columns are u, and an input and"),
+        ("time,u,position\n0,1,2\n1,3,4\n", "2 columns that may be the input"),
+        (
+            "time,position,velocity,acceleration\n0,1,2,3\n1,3,4,5\n",
+            "as a stimulus does, and no output is named; play it with hmpim run",
+        ),
+        (
+            "t;u;y\n0;999;1,025\n1;500;2,050\n2;250;999\n3;125;-1,250\n",
+            "column 'y' holds '1,025' and '999': its commas mark thousands; export the file",
+        ),
+        (
+            "t;u;y\n0.1;999;1.5\n0.2;500;1.25\n0.3;1,025.67;3.5\n",
+            "line 4, column 'u' holds '1,025.67', with marks for thousands",
         ),
         ("time,u,b\n0,1,2\n1,3,4\n", r"which column is the output; .*--output b"),
         ("time,u,command,y\n0,1,2,3\n1,3,4,5\n", r"2 columns that may be the input \(u, command\)"),
@@ -145,6 +161,14 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
 def test_what_is_wrong_is_said_with_its_place(file, content, words):
     with pytest.raises((FormatError, RecordError), match=words):
         read(file(content))
+
+
+def test_fractions_of_three_digits_are_no_thousands(file):
+    """A decimal comma stays one where a number below one, or another count of digits, tells it."""
+    for cells in (("1,025", "2,050", "0,999"), ("1,025", "2,05", "-1,250"), ("5", "1,025", "2")):
+        rows = "".join(f"{k};{cell};{cell}\n" for k, cell in enumerate(cells))
+        found = read(file("t;u;y\n" + rows)).inputs[0].values.tolist()
+        assert found == [float(cell.replace(",", ".")) for cell in cells]
 
 
 def test_samples_out_of_order_are_sorted_and_counted(file):

@@ -170,7 +170,7 @@ def test_options_that_fit_nothing(log, options, words):
 
 def test_a_declared_unit_that_is_another_is_said(tmp_path):
     path = tmp_path / "a.csv"
-    path.write_text("time,u [deg],y\n0,1,2\n1,2,3\n2,3,4\n")
+    path.write_text("time,u [deg],y\n0,1,2\n0.1,2,3\n0.2,3,4\n")
     record = read(path, units={"u": "rad", "y": "V"})
     finding, _ = record.findings
     assert finding.code == "unit_declared"

@@ -153,7 +153,7 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
             "holds what repeats have in common, and the result of one",
         ),
         ('{"schema": "hmpim/model/1"}', "holds an exported model, and the result of one record is"),
-        ('{"schema": "hmpim/identification/2"}', "is not a whole result"),
+        ('{"schema": "hmpim/identification/2"}', "not a whole result: 'pairs' is missing"),
     ):
         (tmp_path / "r.json").write_text(content)
         with pytest.raises(FormatError, match=words):

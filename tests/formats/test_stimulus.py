@@ -24,7 +24,7 @@ def test_bytes_of_a_small_file(tmp_path):
     ramp = Stimulus(waveform=Ramp(rate=0.5, duration=0.75), fs=4.0, unit="m")
     save_stimulus_csv(ramp, tmp_path / "s.csv")
     assert (tmp_path / "s.csv").read_bytes() == (
-        b"# hmpim stimulus; fs = 4.0 Hz, unit = m, sweep = 0.0 s + 0.75 s\n"
+        b"# hmpim stimulus; fs = 4.0 Hz, unit = m, sweep = 0.0 s + 0.75 s, samples = 3\n"
         b"time,position,velocity,acceleration\n"
         b"0.0,0.0,0.5,0.0\n0.25,0.125,0.5,0.0\n0.5,0.25,0.5,0.0\n"
     )

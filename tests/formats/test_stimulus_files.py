@@ -6,7 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.io
 
+from hmpim import Record, save
 from hmpim.errors import ArgumentError, FormatError, LimitsError
 from hmpim.formats.stimulus import save_stimulus_csv, save_stimulus_json
 from hmpim.formats.stimulus_files import STIMULUS_SUFFIXES, read_stimulus, save_stimulus
@@ -203,6 +205,29 @@ def test_bad_files_are_refused_by_name(tmp_path, name):
         (tmp_path / name).write_bytes(BAD[name])
     with pytest.raises(FormatError, match=name.replace(".", r"\.") + "|os.system"):
         read_stimulus(tmp_path / name)
+
+
+@pytest.mark.parametrize("kept", [0.5, 0.999])
+def test_a_table_that_is_cut_short_is_refused(tmp_path, kept):
+    """Its motion would end before it comes to rest."""
+    stimulus = design(**WISH, axis="roll")
+    save_stimulus_csv(stimulus, tmp_path / "s.csv")
+    lines = (tmp_path / "s.csv").read_text().splitlines(keepends=True)
+    whole = lines[: int(len(lines) * kept)]
+    for text in ("".join(whole), "".join(whole) + "1.5,0."):
+        (tmp_path / "cut.csv").write_text(text)
+        words = rf"{len(whole) - 2} of its {stimulus.samples} samples are whole; copy it again"
+        with pytest.raises(FormatError, match=words):
+            read_stimulus(tmp_path / "cut.csv")
+
+
+def test_what_holds_no_stimulus_says_what_to_do(tmp_path):
+    record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, fs=10.0)
+    save(record, tmp_path / "r.h5")
+    scipy.io.savemat(tmp_path / "r.mat", {"u": [0, 1, 0], "log": {"y": [0, 0, 1]}})
+    for name in ("r.h5", "r.mat"):
+        with pytest.raises(FormatError, match=f"{name}' holds no stimulus; make one with hmpim"):
+            read_stimulus(tmp_path / name)
 
 
 def test_a_specification_beyond_its_limits_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.nonlinear.mechanisms import play, rate_limited
+from hmpim.model.operators import play, rate_limited
 from tests_support import in_studies
 
 FS, SUBSTEPS, DELAY = 200.0, 16, 0.03

@@ -351,3 +351,23 @@ def test_predicted_and_achieved_errors_agree(which, request, seeds):
     for name, errors in off.items():
         achieved = np.sqrt(np.mean(np.square(errors))) / getattr(found.errors, name)
         assert 0.95 * low < achieved < 1.05 * high, name
+
+
+@pytest.mark.parametrize("family", ["multisine", *in_studies("sweep", "exponential")])
+def test_the_shortest_record_has_lines_enough_for_its_error_bars(family):
+    """With little noise a few periods would do, of which no model can be trusted."""
+    unit = RoughModel(delay=0.01, natural_frequency=12.0, damping_ratio=0.5)
+    found = gentlest(
+        accuracy=Accuracy(delay=0.004, natural_frequency=0.02, damping_ratio=0.03),
+        model=unit,
+        noise_std=0.05,
+        limits=Limits(position=5, velocity=300, acceleration=8000, unit="deg"),
+        fs=200.0,
+        gentle="duration",
+        families=(family,),
+    )
+    assert found.value < 0.9
+    sensor = Sensor(delay=0.01, natural_frequency=12.0, damping_ratio=0.5, noise_std=0.05)
+    pair = identify(run(sensor, found.stimulus, rng=1))["y", "u"]
+    assert pair.verdict == "ok"
+    assert pair.parameters.natural_frequency.std < 0.02 * 12.0 / 1.9

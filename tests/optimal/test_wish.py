@@ -77,6 +77,14 @@ def test_the_tail_holds_the_slowest_response():
         (lambda: RoughModel(natural_frequency=1, damping_ratio=1, scale_factor=0), "scale_factor"),
         (lambda: ModelRange(natural_frequency=(14, 7)), r"\(14, 7\) does not rise"),
         (lambda: ModelRange(damping_ratio=(0, 1)), "does not rise from a positive"),
+        (
+            lambda: wish(model_range=ModelRange(natural_frequency=(12, 14))),
+            "natural_frequency = 10 is outside its range, 12 to 14",
+        ),
+        (
+            lambda: wish(model_range=ModelRange(damping_ratio=(0.1, 0.2))),
+            "damping_ratio = 0.4 is outside its range",
+        ),
         (lambda: wish(noise_std=0.0), "noise_std = 0.0 must be"),
         (lambda: wish(gentle="kind"), "gentle = 'kind' is not known"),
         (lambda: wish(gentle="duration", limits=Limits()), "no limit is finite"),

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from hmpim.errors import RecordError
 from hmpim.identify import identify
 from hmpim.record import Channel, Record, Series, uniform
 from hmpim.record.mend import mend
@@ -145,6 +146,32 @@ def test_a_coarse_clock_is_seen_through_its_digits_and_pauses(clock, stamps):
     assert np.abs(found - clock - np.median(found - clock)).max() < 5e-4
     steps = np.diff(clock) < 6e-4  # but for the pauses
     assert np.diff(found)[steps] == pytest.approx(5e-4, abs=2e-7)
+
+
+@pytest.mark.parametrize("tick", [0.1, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("cut", [np.floor, np.round], ids=["cut", "rounded"])
+@pytest.mark.parametrize("fs", [200.0, 187.3])
+def test_the_rate_of_a_clock_of_few_ticks_is_right_to_a_sample(tick, cut, fs):
+    """The ends of the record hold parts of a tick: of stamps in whole seconds the rate was 1 % off.
+
+    A tick begins within one sample of where its stamp does, so that the rate is known to one
+    sample over the whole ticks.
+    """
+    clock = every(fs)[: int(15.3 * fs)]
+    mended = mend([Series(name="u", values=sweep(clock), time=tick * cut(clock / tick + 1e-9))])
+    found = np.diff(mended.channels[0].time)
+    whole = (15.3 // tick - 2.0) * tick * fs
+    assert found == pytest.approx(1.0 / fs, rel=1.0 / whole)
+
+
+def test_a_clock_of_two_ticks_tells_no_rate():
+    """Ten seconds of Unix time in nine digits: the rate was 82 Hz for 200 Hz, and all was ok."""
+    clock = every(200.0)[:1824]
+    stamps = [float(f"{t + 1.7e9:.9g}") for t in clock]
+    with pytest.raises(
+        RecordError, match=r"2 stamps for 1824 samples, which .* the rate with --fs"
+    ):
+        mend([Series(name="u", values=sweep(clock), time=np.array(stamps))])
 
 
 def test_a_coarse_clock_that_wanders_is_followed():

@@ -197,6 +197,21 @@ def test_masked_to_less_than_two_samples_is_refused():
         four_roles(outputs={"y": y})
 
 
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_dates_are_taken_in_seconds_since_the_first(unit):
+    """As pandas has them: nanoseconds had been taken for seconds, and all was ok."""
+    since = np.arange(3) * np.timedelta64(5, "ms")
+    dates = np.datetime64("2026-03-01T23:59:59.995", unit) + since
+    for time in (dates, since):
+        record = Record.from_arrays({"u": [0, 1, 0]}, {"y": [0, 0, 1]}, time=time)
+        assert record.inputs[0].time.tolist() == [0.0, 0.005, 0.01]
+        assert record.fs == pytest.approx(200.0)
+    with pytest.raises(RecordError, match=r"'u \(time\)' holds dates or durations; give numbers"):
+        Channel(name="u", time=dates, values=np.zeros(3))
+    with pytest.raises(RecordError, match="'u' holds dates or durations"):
+        Record.from_arrays({"u": dates}, {"y": [0, 0, 1]}, fs=10.0)
+
+
 def test_complex_time_is_refused():
     with pytest.raises(RecordError, match=r"'u \(time\)' is complex"):
         Channel(name="u", time=np.array([0, 1j]), values=[0.0, 1.0])

@@ -21,6 +21,7 @@ from hmpim.stimulus import (
     rest_to_rest,
     true_peaks,
 )
+from hmpim.stimulus.inside import check_inside as looked_at_by_a_rig
 from hmpim.stimulus.solve import sweep_peaks
 from tests_support import designed_once, examples
 
@@ -385,3 +386,44 @@ def test_true_peaks_are_no_less_and_hardly_more_than_a_dense_scan(wish, n, start
     for name in ("position", "velocity", "acceleration"):
         scanned = np.abs(getattr(at, name)).max()
         assert scanned * (1 - 1e-10) <= getattr(peaks, name) <= scanned * (1 + 1e-3)
+
+
+@pytest.mark.parametrize("duration", [10.0, 10.00001, 10.0001, 10.0019])
+def test_a_printed_sweep_run_backwards_keeps_its_limits_up_to_its_last_sample(duration):
+    """Its singular instant is the end, and a sample may lie just before that."""
+    limits = Limits(position=10, velocity=1000, acceleration=40000)
+    stimulus = design(
+        band=(0.1, 10), duration=duration, fs=500, limits=limits,
+        kind="reversed", extinction=0.3, lead=0,
+    )  # fmt: skip
+    peak = np.abs(stimulus.acceleration).max()
+    assert peak <= min(stimulus.peaks.acceleration, limits.acceleration) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("limits", "wish"),
+    [
+        (
+            Limits(position=27893.960102756308, acceleration=17.860866510314835),
+            {
+                "band": (0.005656823398254191, 0.7754450143481508),
+                "duration": 133.308340627076,
+                "fs": 387.7225071740754,
+                "kind": "steps",
+                "lead": 1094.5789405530497,
+            },
+        ),
+        (
+            Limits(acceleration=19.0260721943255),
+            {
+                "band": (47.108348004686775, 2442.7722397052985),
+                "duration": 0.09490607474966888,
+                "fs": 1221386.1198526493,
+                "kind": "exponential",
+                "extinction": 2.0,
+            },
+        ),
+    ],
+)
+def test_rounding_of_a_small_motion_sampled_fast_is_not_taken_for_an_excess(limits, wish):
+    looked_at_by_a_rig(design(limits=limits, **wish), limits, whose="yaw")

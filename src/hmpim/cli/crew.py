@@ -11,5 +11,8 @@ Scheduler = Annotated[
     typer.Option("--scheduler", metavar="tcp://HOST:PORT", help="A Dask scheduler to use."),
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes on this computer.")
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", help="Processes on this computer; 0: no further process."
+    ),
 ]

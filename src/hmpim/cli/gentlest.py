@@ -14,7 +14,7 @@ from hmpim.cli.terminal import output_console, say
 from hmpim.errors import ArgumentError, LimitsError
 
 if TYPE_CHECKING:
-    from hmpim.optimal import Family, Gentlest, TradePoint
+    from hmpim.optimal import Family, Gentlest, TradePoint, Wish
     from hmpim.optimal.gentlest import Progress
 
 __all__ = ["gentlest"]
@@ -227,6 +227,17 @@ def _rows(found: "Gentlest") -> list[tuple[str, str, float | None, float, float]
     ]
 
 
+def _asked(name: str, wanted: float | None, wish: "Wish") -> str:
+    """What is wanted, in words; over the range where it is a share of what has a range."""
+    if wanted is None:
+        return "–"
+    span = wish.model_range.natural_frequency
+    if name == "natural_frequency" and span is not None:
+        share = wanted / wish.model.natural_frequency
+        return f"{share * span[0]:.3g} to {share * span[1]:.3g}"
+    return f"{wanted:.3g}"
+
+
 def _print(found: "Gentlest") -> None:
     from rich.table import Table
 
@@ -239,7 +250,7 @@ def _print(found: "Gentlest") -> None:
     for heading in ("parameter", "wanted", "predicted", "worst in range", "unit"):
         table.add_column(heading, justify="left" if heading in ("parameter", "unit") else "right")
     for name, of, wanted, predicted, worst in _rows(found):
-        asked = "–" if wanted is None else f"{wanted:.3g}"
+        asked = _asked(name, wanted, found.wish)
         table.add_row(name.replace("_", " "), asked, f"{predicted:.3g}", f"{worst:.3g}", of)
     console.print(table)
     console.print(

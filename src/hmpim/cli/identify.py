@@ -20,6 +20,7 @@ from hmpim.cli.paging import (
     UnderTest,
     about_of,
     check_paper,
+    tables_in,
     write_beside,
 )
 from hmpim.cli.reading import (
@@ -187,7 +188,12 @@ def identify(
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},
-        writes={"--json": json, "--report": report, "--sign": sign},
+        writes={
+            "--json": json,
+            "--report": report,
+            "--sign": sign,
+            "--figures": tables_in(figures),
+        },
         folders={"--figures": figures},
     )
     check_paper(report, sign)
@@ -423,6 +429,9 @@ def _predictions(result: "Identification", data: "Record", split: float) -> list
         if not has_model(pair):
             notes.append(f"{name}: no model to predict with.")
             continue
-        fit = predict(pair, data, start=split).fit_percent
-        notes.append(f"{name}: predicted from {split:.4g} s on with a fit of {fit:.2f} %.")
+        found = predict(pair, data, start=split)
+        notes.append(
+            f"{name}: predicted from {split:.4g} s on with a fit of {found.fit_percent:.2f} %."
+        )
+        notes += [finding.message for finding in found.findings]
     return notes

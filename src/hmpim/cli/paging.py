@@ -21,6 +21,7 @@ __all__ = [
     "UnderTest",
     "about_of",
     "check_paper",
+    "tables_in",
     "write_beside",
 ]
 
@@ -48,6 +49,12 @@ Figures = Annotated[
         "--figures", metavar="DIR", help="Write every figure as SVG and PNG, its numbers as CSV."
     ),
 ]
+
+
+def tables_in(figures: Path | None) -> list[Path]:
+    """Tables that --figures writes, which a record in that folder could be."""
+    names = ("parameters.csv", "response-1.csv")
+    return [] if figures is None else [figures / name for name in names]
 
 
 def about_of(title: str, under_test: str, test: str, operator: str, date: str) -> "About":

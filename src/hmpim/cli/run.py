@@ -10,6 +10,7 @@ import typer
 
 from hmpim.cli.complete import complete_rig
 from hmpim.cli.files import check_files
+from hmpim.cli.paging import check_paper
 from hmpim.cli.stages import Stages
 from hmpim.cli.terminal import output_console, say, warn, working
 from hmpim.errors import ArgumentError, HmpimError, RigError
@@ -60,7 +61,8 @@ def run(
             "-o",
             "--output",
             metavar="FILE",
-            help="File for the record. An .h5 file is written during the run and survives a kill.",
+            help="File for the record, written during the run; a kill leaves an .h5 file as it is, "
+            "and of others FILE.partial.h5.",
         ),
     ] = None,
     until: Annotated[
@@ -138,7 +140,7 @@ def run(
         reads={"the stimulus": stimulus, "the rig's file": _files_of(rig, rig_file)},
         writes={"-o": output, "--log": log, "--json": json, "--report": report},
     )
-    _check_kept(output, kept=json is not None or report is not None)
+    _check_kept(output, json=json, report=report)
     from hmpim.experiment import Feel, RunLog, RunOptions, until_of
     from hmpim.experiment import run as play
     from hmpim.formats.stimulus_files import read_stimuli
@@ -291,12 +293,15 @@ def _pictures(rig: "Rig") -> "list[Picture]":
     return [frames_picture(frames)] if frames else []
 
 
-def _check_kept(output: Path | None, *, kept: bool) -> None:
-    """Refuse, before anything moves, a run of which nothing is kept."""
+def _check_kept(output: Path | None, *, json: Path | None, report: Path | None) -> None:
+    """Refuse, before anything moves, a run of which nothing is kept, or can be written."""
     from hmpim.formats.saving import suffixes_of
     from hmpim.record import Record
 
-    if output is None and not kept:
+    check_paper(report)
+    if json is not None and json.suffix.lower() != ".json":
+        raise ArgumentError(f"--json {json} must end in .json")
+    if output is None and json is None and report is None:
         raise ArgumentError("nothing would be kept of the run; name a file with -o")
     if output is not None and output.suffix.lower() not in suffixes_of(Record):
         raise ArgumentError(f"-o {output} must end in one of {', '.join(suffixes_of(Record))}")

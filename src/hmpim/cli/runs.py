@@ -36,11 +36,12 @@ def runs(
     from json import dumps
 
     from hmpim.formats.atomic import write_text
-    from hmpim.formats.runs import filter_runs, find_runs, schema_of
+    from hmpim.formats.runs import files_of, filter_runs, find_runs, schema_of
     from hmpim.report.runs import compare_runs, print_changes, print_runs
 
     with working(f"Reading {folder}"):
         found = find_runs(folder)
+    check_files(reads={"one of the runs": files_of(found, folder)}, writes={"--json": json})
     kept = filter_runs(found.runs, where or ())
     changes = compare_runs(kept) if compare else []
     if not quiet:

@@ -1,5 +1,6 @@
 """`hmpim validate`: a result held against a record, or against an older result."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -7,6 +8,18 @@ import typer
 
 from hmpim.cli.export import read_result
 from hmpim.cli.files import check_files
+from hmpim.cli.reading import (
+    From,
+    Rate,
+    Sheet,
+    StampChoice,
+    Stamps,
+    Time,
+    To,
+    Unit,
+    reading,
+    units_of,
+)
 from hmpim.cli.terminal import output_console, working
 from hmpim.errors import ArgumentError
 
@@ -49,10 +62,17 @@ def validate(
             "--chance", metavar="P", help="Lowest p-value of the residual's tests that passes."
         ),
     ] = 1e-4,
-    fs: Annotated[
-        float | None,
-        typer.Option("--fs", metavar="HZ", help="Sampling rate, if the record has no time."),
+    fs: Rate = None,
+    time: Time = None,
+    unit: Unit = None,
+    from_: From = None,
+    to: To = None,
+    sweep: Annotated[
+        int | None,
+        typer.Option("--sweep", metavar="N", help="Take this sweep of several in a log."),
     ] = None,
+    stamps: StampChoice = Stamps.AUTO,
+    sheet: Sheet = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures as JSON.")
     ] = None,
@@ -76,11 +96,23 @@ def validate(
     bounds = Bounds(fit_percent=fit, noise_ratio=noise_ratio, chance=chance)
     figures: dict[str, Any] = {"schema": "hmpim/validation/1", "passed": True}
     if record is not None:
-        data = _read(record, found, fs)
+        options = reading(
+            start=from_,
+            stop=to,
+            sweep=None if sweep is None else str(sweep),
+            stamps=stamps,
+            sheet=sheet,
+        )
+        data = _read(
+            record, found, {"fs": fs, "time": time, "units": units_of(unit), "options": options}
+        )
         with working("Predicting"):
             validation = check(found, data, bounds=bounds)
         figures |= validation.to_dict()
         output_console().print(_checks(validation))
+        for output in validation.outputs:
+            for finding in output.findings:
+                output_console().print(finding.message)
     if against is not None:
         changes = compare(found, read_result(against))
         changed = any(change.changed for change in changes)
@@ -98,7 +130,7 @@ def validate(
         raise typer.Exit(NOT_MET)
 
 
-def _read(record: Path, found: "Identification", fs: float | None) -> Any:
+def _read(record: Path, found: "Identification", how: Mapping[str, Any]) -> Any:
     """Read the channels that the result has models of."""
     from hmpim.formats import read
     from hmpim.identify import has_model
@@ -109,7 +141,7 @@ def _read(record: Path, found: "Identification", fs: float | None) -> Any:
             record,
             inputs=list(dict.fromkeys(pair.input for pair in known)) or None,
             outputs=list(dict.fromkeys(pair.output for pair in known)) or None,
-            fs=fs,
+            **how,
         )
 
 

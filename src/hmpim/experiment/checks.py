@@ -203,7 +203,7 @@ def check_stimuli(
         if bounds is None:
             log.add("check", f"{whose}: no limits")
             continue
-        check_inside(stimulus, bounds, whose=whose, samples=samples)
+        check_inside(stimulus, bounds, whose=whose, samples=samples, from_rest=moves(rig))
         there = bounds.to(stimulus.unit)
         motion = stimulus.motion(np.arange(samples) / stimulus.fs)
         reach = check_stoppable(motion.time, motion.position, motion.velocity, there, whose=whose)

@@ -16,6 +16,8 @@ __all__ = ["Collected", "Played", "default_layout"]
 
 FloatArray = NDArray[np.float64]
 _EMPTY = Samples(time=np.empty(0), values=np.empty(0))
+_BACK = 0.1  # s: no network lets newer samples pass one for so long
+_AHEAD = 10.0  # s that stamps may gain on the run from one block to the next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -79,6 +81,7 @@ class Collected:
         self._name = name
         self._specs = {spec.name: spec for spec in layout.channels}
         self._parts: dict[str, list[Samples]] = {spec.name: [] for spec in layout.channels}
+        self._newest: dict[str, tuple[float, float]] = {}  # stamp, and when it came
         self.stopping: Stopping | None = None
         """That the run ends because it is sure."""
 
@@ -100,8 +103,9 @@ class Collected:
         Raises
         ------
         RigError
-            If it returned a channel that its layout does not have, or another number of
-            samples than the block has commands.
+            If it returned a channel that its layout does not have, another number of samples
+            than the block has commands, or stamps of a clock that was set meanwhile: no record
+            could hold them together with those before.
         """
         stamps = block.time if sent is None else sent
         new = self._named(block, reply, stamps)
@@ -169,8 +173,26 @@ class Collected:
                     f"rig {self._name!r} returned channel {name!r}, which its layout does not "
                     f"have; it has {', '.join(self._specs)}"
                 )
-            new[name] = given if isinstance(given, Samples) else self._on_clock(name, given, stamps)
+            if isinstance(given, Samples):
+                self._check_clock(name, given, now=float(block.time[-1]))
+                new[name] = given
+            else:
+                new[name] = self._on_clock(name, given, stamps)
         return new
+
+    def _check_clock(self, name: str, samples: Samples, *, now: float) -> None:
+        """Refuse samples whose clock was set since those before; single stamps may be damaged."""
+        time = samples.time[np.isfinite(samples.time)]
+        if not time.size:
+            return
+        newest, came = self._newest.get(name, (float(np.median(time)), now))
+        likely = time[time <= newest + 2.0 * (now - came) + _AHEAD]
+        if not likely.size or float(np.max(likely)) < newest - _BACK:
+            raise RigError(
+                f"the clock of {name!r} was set: a sample at {newest:.6g} s is followed by one at "
+                f"{time[0]:.6g} s; {self._name!r} is stopped, and the samples until then are kept"
+            )
+        self._newest[name] = (max(newest, float(np.max(likely))), now)
 
     def _columns(self, block: Block, reply: object) -> dict[str, FloatArray]:
         """Columns of a bare array, by the names of the outputs."""

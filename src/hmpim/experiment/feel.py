@@ -165,9 +165,10 @@ def _swing(channel: Channel) -> float:
 def _growth(record: Record, limits: Mapping[str, Limits | None]) -> float:
     """Largest measured position as a share of its limit."""
     shares = [0.0]
+    only = next(iter(limits.values())) if len(limits) == 1 else None
     for channel in record.outputs:
         axis = channel.name.removesuffix(".position")
-        bound = limits.get(axis, limits.get("") if len(limits) == 1 else None)
+        bound = limits.get(axis, only)
         if bound is None or not np.isfinite(bound.position) or channel.unit == "":
             continue
         try:

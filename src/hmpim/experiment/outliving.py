@@ -6,6 +6,7 @@ stops the rig when the run says so, when the run falls silent, or when the run i
 """
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
@@ -20,6 +21,7 @@ from typing import Any, Self
 
 from hmpim.errors import HmpimError, RigError
 from hmpim.experiment.collect import Collected, default_layout
+from hmpim.experiment.deadline import Deadline
 from hmpim.experiment.pacer import Pacer
 from hmpim.rigs import (
     Block,
@@ -41,6 +43,7 @@ _AHEAD = 5  # blocks handed over before the first answer is awaited: 0.1 s
 _SILENCE = 0.5  # s without a block after which the child stops the rig
 _START = 30.0  # s in which the child must have begun
 _STOP = 30.0  # s in which it must have stopped the rig
+_HANGS = 1.0  # s after a stop within which the driver must return from what it does
 
 
 class OutlivingRig:
@@ -168,6 +171,9 @@ class OutlivingRig:
             self._connection = None
         if self._process is not None:
             self._process.join(_STOP)
+            if self._process.is_alive():  # its driver hangs in compiled code
+                self._process.kill()
+                self._process.join()
 
     def _tell(self, what: str, value: object = None) -> None:
         if self._connection is None:
@@ -203,8 +209,8 @@ class _Told(BaseException):
 class _Inbox:
     """Messages of the run; "stop", and that the run is gone, overtake the others."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
+    def __init__(self, connection: Connection, deadline: Deadline) -> None:
+        self._connection, self._deadline = connection, deadline
         self._messages: deque[tuple[str, Any]] = deque()
         self._came = threading.Condition()
         self.stop = False
@@ -218,10 +224,10 @@ class _Inbox:
             except (EOFError, OSError):
                 what, value = "gone", None
             with self._came:
-                if what == "stop":
-                    self.stop = True
-                elif what in ("gone", "exit"):
-                    self.gone = True
+                if what in ("stop", "gone", "exit"):
+                    self.stop = self.stop or what == "stop"
+                    self.gone = self.gone or what != "stop"
+                    self._deadline.shorten(_HANGS)
                 else:
                     self._messages.append((what, value))
                 self._came.notify()
@@ -259,23 +265,34 @@ def _child(connection: Connection, build: Callable[..., Rig], arguments: tuple[A
     if hasattr(os, "setsid"):
         os.setsid()  # Ctrl-C at the terminal is for the run, which then says stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    inbox = _Inbox(connection)
+
+    def hangs() -> None:
+        _stopped(rig)
+        if inbox.gone:
+            os._exit(1)
+
+    deadline = Deadline(SystemClock(), instead=hangs)
+    inbox = _Inbox(connection, deadline)
 
     def end(_number: int, _frame: FrameType | None) -> None:
         inbox.gone = True
+        deadline.shorten(_HANGS)
 
     signal.signal(signal.SIGTERM, end)
     try:
         rig = build(*arguments)
-        with rig:
+        with rig, deadline:
             _say(connection, "ok", {"name": rig.name, "axes": rig.axes, "limits": rig.limits})
-            _drive(rig, connection, inbox)
+            try:
+                _drive(rig, connection, inbox, deadline)
+            finally:
+                _stopped(rig)
     except BaseException as error:
         _say(connection, "error", _portable(error))
 
 
-def _drive(rig: Rig, connection: Connection, inbox: _Inbox) -> None:
-    """Do what the run says; stop the rig in the end, whatever happens."""
+def _drive(rig: Rig, connection: Connection, inbox: _Inbox, deadline: Deadline) -> None:
+    """Do what the run says, until it is gone."""
     collected: Collected | None = None
     pacer: _ChildPacer | None = None
     playing = False
@@ -295,7 +312,10 @@ def _drive(rig: Rig, connection: Connection, inbox: _Inbox) -> None:
                 _say(connection, "ok", layout)
             elif what == "play" and collected is not None and pacer is not None:
                 playing = not value.last
-                reply = rig.play(replace(value, pace=pacer))
+                with deadline.within(math.inf, "it did not return from play"):
+                    if inbox.stop or inbox.gone:
+                        raise _Told
+                    reply = rig.play(replace(value, pace=pacer))
                 sent = pacer.sent_of(value)
                 samples = collected.take(value, reply, sent=sent)
                 _say(connection, "ok", (value.start, sent, dict(samples)))
@@ -307,7 +327,6 @@ def _drive(rig: Rig, connection: Connection, inbox: _Inbox) -> None:
         except BaseException as error:
             playing = False
             _say(connection, "error", _portable(error))
-    _stopped(rig)
 
 
 def _prepared(rig: Rig, stimulus: Stimuli, inbox: _Inbox) -> tuple[Collected, _ChildPacer, Layout]:
@@ -315,7 +334,7 @@ def _prepared(rig: Rig, stimulus: Stimuli, inbox: _Inbox) -> tuple[Collected, _C
     layout = rig.prepare(stimulus)
     if layout is None:
         layout = default_layout(commands, name=rig.name)
-    pacer = _ChildPacer(SystemClock(), fs=commands.fs, count=len(commands))
+    pacer = _ChildPacer(SystemClock(), fs=commands.fs, count=len(commands), latest=_SILENCE)
     pacer.inbox = inbox
     return Collected(layout, name=rig.name), pacer, layout
 

@@ -1,8 +1,11 @@
 """The pace of a run: each command goes when it is due, and when it went is noted."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.errors import RigError
 from hmpim.rigs import Block, Clock
 
 __all__ = ["Pacer"]
@@ -19,6 +22,8 @@ class Pacer:
         Commands a second.
     count : int
         Commands of the whole run.
+    latest : float
+        Seconds by which a command may go late.
 
     Examples
     --------
@@ -30,9 +35,9 @@ class Pacer:
     [0.0, 0.1, 0.2]
     """
 
-    def __init__(self, clock: Clock, *, fs: float, count: int) -> None:
+    def __init__(self, clock: Clock, *, fs: float, count: int, latest: float = math.inf) -> None:
         self._clock = clock
-        self._period = 1.0 / fs
+        self._period, self._latest = 1.0 / fs, latest
         self._start: float | None = None
         self._sent = np.full(count, np.nan)
 
@@ -59,8 +64,22 @@ class Pacer:
         return 0.0 if self._start is None else number * self._period - self.now()
 
     def wait(self, number: int) -> None:
-        """Return when command `number` is due; the first is due at once."""
+        """Return when command `number` is due; the first is due at once.
+
+        Raises
+        ------
+        RigError
+            If it is later than it may be: those that are due by now would all go at once.
+        """
         if self._start is None:
             self._start = self._clock.now() - number * self._period
         self._clock.sleep_until(self._start + number * self._period)
-        self._sent[number] = self._clock.now() - self._start
+        now = self._clock.now() - self._start
+        late = now - number * self._period
+        if late > self._latest:
+            raise RigError(
+                f"command {number} is {late:.3g} s late, and {self._latest:g} s are allowed: this "
+                "computer paused, or the driver is slower than the stimulus's rate; the run was "
+                "ended, as all commands that are due would go at once"
+            )
+        self._sent[number] = now

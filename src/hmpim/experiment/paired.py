@@ -5,7 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.record import Channel, Record, uniform
+from hmpim.errors import RecordError
+from hmpim.record import Record, Series, uniform
+from hmpim.record.mend import mend
 from hmpim.rigs import Samples
 
 __all__ = ["Paired"]
@@ -57,10 +59,15 @@ class Paired:
         if len(whole) < 2 or min(part.time.size for part in whole) < 4 * _BACK:
             return np.empty(0), np.empty(0)
         u, y = whole
-        if u.time.size == y.time.size and np.array_equal(u.time, y.time) and self._even(u.time):
+        same = u.time.size == y.time.size and np.array_equal(u.time, y.time)
+        if same and self._even(u.time) and np.isfinite((u.values, y.values)).all():
             values, known = (u.values, y.values), u.time.size
         else:
-            aligned = uniform(self._record(u, y))
+            try:
+                aligned = uniform(self._record(u, y))
+            except RecordError:  # what is wrong with them is said when the run is over
+                self.whole = False
+                return np.empty(0), np.empty(0)
             one, other = aligned.inputs[0], aligned.outputs[0]
             self._look_for_holes(one.valid & other.valid)
             values, known = (one.values, other.values), aligned.samples - _BACK
@@ -72,13 +79,15 @@ class Paired:
         return bool(np.abs(np.diff(time) * self._fs - 1.0).max() < _EVEN)
 
     def _record(self, u: Samples, y: Samples) -> Record:
-        """Both; a clock of its own that is far from the run's begins with its first sample."""
+        """Both, mended; a clock of its own far from the run's begins with its first sample."""
         late = float(y.time[0] - u.time[0])
         shift = late if abs(late) > 1.0 else 0.0
-        source, answer = (
-            Channel(name=name, time=part.time - by, values=part.values)
-            for name, part, by in zip(("u", "y"), (u, y), (0.0, shift), strict=True)
-        )
+        source, answer = mend(
+            [
+                Series(name=name, time=part.time - by, values=part.values)
+                for name, part, by in zip(("u", "y"), (u, y), (0.0, shift), strict=True)
+            ]
+        ).channels
         return Record(inputs=(source,), outputs=(answer,), fs=self._fs)
 
     def _look_for_holes(self, valid: NDArray[np.bool_]) -> None:

@@ -9,7 +9,7 @@ from hmpim.errors import HmpimError
 from hmpim.experiment.collect import Collected
 from hmpim.experiment.log import Event, RunLog
 from hmpim.formats.atomic import check_writable
-from hmpim.formats.recording import RecordWriter, save_recording
+from hmpim.formats.recording import RecordWriter, check_free, save_recording
 from hmpim.formats.saving import save
 from hmpim.record import Finding, Record
 from hmpim.rigs import Commands, Layout, LimitsOfAxes, RunReport, Samples
@@ -28,8 +28,9 @@ class Recorder:
     Parameters
     ----------
     path : path-like or None
-        File to write; one that ends in .h5 grows as samples come, any other is written at the
-        end, or when the run fails. None keeps nothing.
+        File to write; one that ends in .h5 grows as samples come. Any other is written at the
+        end, or when the run fails; until then a file NAME.partial.h5 beside it grows. None keeps
+        nothing.
     rig : str
         On what it is played.
     limits : Limits, or mapping of axis to Limits, or None
@@ -44,7 +45,7 @@ class Recorder:
     Raises
     ------
     ArgumentError
-        If the file cannot be written there, or the disk is too full for it.
+        If the file cannot be written there, another run writes it, or the disk is too full.
     """
 
     def __init__(
@@ -68,21 +69,25 @@ class Recorder:
         if self._path is not None:
             channels = 2 * len(commands.axes)
             check_writable(self._path, size=_BYTES * channels * len(commands))
+        if self.growing is not None:
+            check_free(self.growing)
 
     @property
-    def grows(self) -> bool:
-        """Whether samples go to the disk as they come."""
-        return self._path is not None and self._path.suffix.lower() in _GROWING
+    def growing(self) -> Path | None:
+        """File to which samples go as they come."""
+        if self._path is None or self._path.suffix.lower() in _GROWING:
+            return self._path
+        return self._path.with_name(f"{self._path.name}.partial.h5")
 
     def open(
         self, layout: Layout, collected: Collected, *, band: tuple[float, float] | None
     ) -> None:
         """Lay out the file, before anything moves; one that does not grow takes `collected`."""
         self._collected, self._band = collected, band
-        if self._path is None or not self.grows:
+        if self.growing is None:
             return
         self._writer = RecordWriter(
-            self._path,
+            self.growing,
             layout,
             fs=self._commands.fs,
             samples=len(self._commands),
@@ -106,37 +111,51 @@ class Recorder:
             self._flush()
 
     def finish(self, record: Record) -> None:
-        """Keep the whole record, its stamps put right and its findings with it."""
-        if self._path is None:
-            return
-        self._log.follow(None)
-        if self._writer is not None:
-            self._flush()
-            self._writer.close()
-            lines = [str(event) for event in self._log.events]
-            save_recording(
-                record,
-                self._path,
-                stimuli=self._stimuli,
-                rig=self._rig,
-                limits=self._limits,
-                log=lines,
-            )
-            return
-        save(record, self._path)
+        """Keep the whole record, its stamps put right and its findings with it.
 
-    def fail(self, reason: str) -> bool:
-        """Keep what there is, marked incomplete; say whether there is anything."""
+        Raises
+        ------
+        HmpimError
+            If it cannot be written; what was recorded is then in `growing`.
+        """
+        self._log.follow(None)
+        if self._path is None or self._writer is None:
+            return
+        self._flush()
+        self._writer.close()
+        if self._path != self.growing:
+            save(record, self._path)
+            self._remove_grown()
+            return
+        save_recording(
+            record,
+            self._path,
+            stimuli=self._stimuli,
+            rig=self._rig,
+            limits=self._limits,
+            log=[str(event) for event in self._log.events],
+        )
+
+    def fail(self, reason: str) -> Path | None:
+        """Keep what there is, marked incomplete; return where it is, None if there is nothing."""
         self._log.follow(None)
         if self._writer is None:
-            return self._saved_so_far(reason)
+            return None
         writer, self._writer = self._writer, None
         with contextlib.suppress(HmpimError):  # a full disk: what was written before is kept
             self._flush_to(writer)
         kept = writer.samples > 1
         with contextlib.suppress(HmpimError):  # the file stays as it grew, and can be read
             writer.close(ended=reason or "the run failed")
-        return kept
+        if self._path != self.growing and self._saved_so_far(reason):
+            self._remove_grown()
+            return self._path
+        return self.growing if kept else None
+
+    def _remove_grown(self) -> None:
+        """Remove the file that grew beside the one that was asked for."""
+        if self.growing is not None:
+            self.growing.unlink(missing_ok=True)
 
     def _saved_so_far(self, reason: str) -> bool:
         """Save what was collected to a file that did not grow."""

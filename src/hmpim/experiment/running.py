@@ -1,7 +1,8 @@
 """One run of one rig, from connecting to disconnecting."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from os import PathLike
 
@@ -14,6 +15,7 @@ from hmpim.experiment.checks import (
     moves,
 )
 from hmpim.experiment.collect import Collected, Played, default_layout
+from hmpim.experiment.deadline import Deadline
 from hmpim.experiment.feel import Feel, feel
 from hmpim.experiment.interrupt import AskedToEnd, undisturbed
 from hmpim.experiment.log import RunLog
@@ -28,11 +30,13 @@ from hmpim.experiment.watch import Watcher
 from hmpim.record import Finding, Record, Stopping
 from hmpim.rigs import (
     Block,
+    Clock,
     Clocked,
     Commands,
     Layout,
     LimitsOfAxes,
     ManualClock,
+    Reply,
     Reporting,
     Rig,
     RunReport,
@@ -54,6 +58,7 @@ EndsWhen = Callable[[Played], str | None]
 
 _AHEAD = 0.1  # s of commands between a decision beside the run and what follows from it
 _SWITCH = 5e-4  # s that whoever looks at the estimate may keep the commands waiting
+_STOP = 60.0  # s that a rig may take to come to rest; OutlivingRig gives its process 30
 _BLOCK = 0.02  # s: commands handed to a rig at once, and how often anybody watching is told
 
 
@@ -85,7 +90,7 @@ class Running:
         if self.options.clock is not None and isinstance(self.rig, Clocked):
             self.rig.use_clock(self.options.clock)
         try:
-            with self.rig:
+            with self._connected():
                 with self._faults_logged():
                     ready = self._check(self._stimuli())
                 findings: list[Finding] = []
@@ -104,6 +109,22 @@ class Running:
                 f"rig {self.rig.name!r} failed: {type(error).__name__}: {error}"
             ) from error
 
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        """Enter the rig, and leave it; what fails there hides no error and costs no record."""
+        self.rig.__enter__()
+        cause: BaseException | None = None
+        try:
+            yield
+        except BaseException as error:
+            cause = error
+            raise
+        finally:
+            try:
+                self.rig.__exit__(type(cause) if cause else None, cause, None)
+            except Exception as error:
+                self.log.add("fault", f"disconnecting failed: {_words(error)}")
+
     def _stimuli(self) -> dict[str, Stimulus]:
         return stimuli_by_axis(self.given, self.rig.axes, name=repr(self.rig.name))
 
@@ -114,13 +135,15 @@ class Running:
         check_stimuli(stimuli, limits, rig=self.rig, log=self.log)
         commands = commands_of(stimuli)
         clock = SystemClock() if self.options.clock is None else self.options.clock
-        pacer = Pacer(clock, fs=commands.fs, count=len(commands))
+        late = self.options.watch.late if moves(self.rig) else None
+        latest = math.inf if late is None else late
+        pacer = Pacer(clock, fs=commands.fs, count=len(commands), latest=latest)
         return _Ready(stimuli=stimuli, limits=limits, commands=commands, pacer=pacer)
 
     def _felt(self, ready: _Ready, how: Feel, findings: list[Finding]) -> _Ready:
         """Move a little first, and return what may be moved then."""
-        grows = self.path is not None and self._recorder(ready, path=self.path).grows
-        feeling = replace(self, until=None, subscribers=(), path=self.path if grows else None)
+        grows = self._recorder(ready, path=self.path).growing
+        feeling = replace(self, until=None, subscribers=(), path=grows)
 
         def play(stimuli: Mapping[str, Stimulus]) -> Record:
             with self._faults_logged():
@@ -154,10 +177,15 @@ class Running:
             record = self._played(ready, findings, recorder)
         except BaseException as error:
             with undisturbed():
-                if recorder.fail(_words(error)):
-                    self.log.add("kept", f"what was recorded until then is in {self.path}")
+                kept = recorder.fail(_words(error))
+                if kept is not None:
+                    self.log.add("kept", f"what was recorded until then is in {kept}")
             raise
-        recorder.finish(record)
+        try:
+            recorder.finish(record)
+        except HmpimError:
+            self.log.add("kept", f"what was recorded is in {recorder.growing}")
+            raise
         return record
 
     def _played(self, ready: _Ready, findings: list[Finding], recorder: Recorder) -> Record:
@@ -168,8 +196,11 @@ class Running:
             ):
                 if moves(self.rig):
                     self.log.add("note", scheduling)
-                with quick_to_switch(_SWITCH if isinstance(self.until, Until) else None):
-                    layout, collected = self._play(ready, findings, recorder)
+                with (
+                    quick_to_switch(_SWITCH if isinstance(self.until, Until) else None),
+                    Deadline(self._watch_clock(), instead=self._stop_beside) as deadline,
+                ):
+                    layout, collected = self._play(ready, findings, recorder, deadline)
         except BaseException as cause:
             self._stop_after(cause)
             raise
@@ -186,7 +217,7 @@ class Running:
             return collected.record(fs=ready.commands.fs, band=band, report=said)
 
     def _play(
-        self, ready: _Ready, findings: list[Finding], recorder: Recorder
+        self, ready: _Ready, findings: list[Finding], recorder: Recorder, deadline: Deadline
     ) -> tuple[Layout, Collected]:
         commands = ready.commands
         only = next(iter(ready.stimuli.values()))
@@ -197,7 +228,12 @@ class Running:
         recorder.open(layout, collected, band=shared_band(ready.stimuli))
         self.log.add("arm", f"{self.rig.name}: {', '.join(c.name for c in layout.channels)}")
         watcher = Watcher(
-            self.options.watch, ready.limits, name=self.rig.name, real=moves(self.rig)
+            self.options.watch,
+            ready.limits,
+            layout=layout,
+            units=dict(zip(commands.axes, commands.units, strict=True)),
+            name=self.rig.name,
+            real=moves(self.rig),
         )
         sure = self._sure(ready, layout)
         size = max(1, round(_BLOCK * commands.fs))
@@ -205,7 +241,7 @@ class Running:
         self.log.add("start", f"{len(commands)} commands at {commands.fs:g} Hz, {seconds:g} s")
         playing = _Playing(commands, size=size, pace=ready.pacer)
         for block in playing:
-            reply = self.rig.play(block)
+            reply = self._reply(block, deadline)
             samples = collected.take(block, reply, sent=ready.pacer.sent_of(block))
             recorder.take(samples, now=float(block.time[-1]))
             played = Played(block=block, layout=layout, samples=samples, seconds=seconds)
@@ -222,6 +258,32 @@ class Running:
         else:
             self.log.add("done", f"{len(playing.commands)} commands played")
         return layout, collected
+
+    def _reply(self, block: Block, deadline: Deadline) -> Reply:
+        """Play a block; a rig that moves must answer in time."""
+        patience = self.options.watch.answer if moves(self.rig) else None
+        if patience is None:
+            return self.rig.play(block)
+        assert block.pace is not None
+        seconds = max(0.0, block.pace.left(block.stop - 1)) + patience
+        missing = (
+            f"{self.rig.name!r} did not return from play within {patience:g} s after command "
+            f"{block.stop - 1} was due, at {block.time[-1]:.3g} s of the run; does its driver wait "
+            "for an answer that does not come?"
+        )
+        with deadline.within(seconds, missing):
+            return self.rig.play(block)
+
+    def _watch_clock(self) -> Clock:
+        """Clock that another thread may read, as that of an external tick is not."""
+        given = self.options.clock
+        return given if isinstance(given, ManualClock) else SystemClock()
+
+    def _stop_beside(self) -> None:
+        """Stop a rig whose driver hangs in compiled code, from another thread."""
+        self.log.add("fault", f"play of {self.rig.name} hangs; it is stopped from another thread")
+        with suppress(Exception):
+            self.rig.stop()
 
     def _sure(self, ready: _Ready, layout: Layout) -> Sure | None:
         """Whoever looks whether enough is known, beside the run if that is in real time."""
@@ -270,9 +332,11 @@ class Running:
 
     def _stop(self) -> None:
         """Stop the rig; nothing from outside breaks this off."""
-        with undisturbed():
+        late = f"stop did not return within {_STOP:g} s; stop {self.rig.name!r} by hand"
+        with undisturbed(), Deadline(self._watch_clock()) as deadline:
             try:
-                self.rig.stop()
+                with deadline.within(_STOP, late):
+                    self.rig.stop()
             except BaseException as error:
                 self.log.add("fault", f"stop failed: {type(error).__name__}: {error}")
                 raise

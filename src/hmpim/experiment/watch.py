@@ -8,8 +8,9 @@ import numpy as np
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.experiment.collect import Played
-from hmpim.rigs import ChannelSpec, Samples
+from hmpim.rigs import ChannelSpec, Layout, Samples
 from hmpim.stimulus import Limits
+from hmpim.stimulus.limits import QUANTITIES
 from hmpim.units import conversion_factor
 
 __all__ = ["Watch", "Watcher"]
@@ -28,6 +29,12 @@ class Watch:
         any, since a slow axis lags by nature.
     stale : float or None
         Seconds of the run without a new sample of a measured position; None for any.
+    late : float or None
+        Seconds by which a command of a rig that moves may go late: after a pause of the computer
+        those that are due would all go at once. None for any.
+    answer : float or None
+        Seconds after the last command of a block is due within which a rig that moves must return
+        from `play`; None for any.
 
     Raises
     ------
@@ -43,9 +50,11 @@ class Watch:
     margin: float = 0.1
     following_error: float | None = None
     stale: float | None = 0.5
+    late: float | None = 0.5
+    answer: float | None = 5.0
 
     def __post_init__(self) -> None:
-        for name in ("margin", "following_error", "stale"):
+        for name in ("margin", "following_error", "stale", "late", "answer"):
             value = getattr(self, name)
             if value is None and name != "margin":
                 continue
@@ -62,18 +71,46 @@ class Watcher:
         What ends a run.
     limits : mapping of axis to Limits or None
         Of each axis that moves.
+    layout : Layout
+        What will come in.
+    units : mapping of axis to str
+        Unit of each axis that moves.
     name : str
         Of the rig, for messages.
     real : bool
         Whether something real moves; only then data can be stale.
+
+    Raises
+    ------
+    RigError
+        If a following error is to be watched, and the layout has no command to compare with.
+    UnitError
+        If a measured quantity cannot be turned into the unit of its axis.
     """
 
     def __init__(
-        self, watch: Watch, limits: Mapping[str, Limits | None], *, name: str, real: bool
+        self,
+        watch: Watch,
+        limits: Mapping[str, Limits | None],
+        *,
+        layout: Layout,
+        units: Mapping[str, str],
+        name: str,
+        real: bool,
     ) -> None:
-        self._watch, self._limits, self._name = watch, limits, name
+        self._watch, self._name = watch, name
         self._stale = watch.stale if real else None
         self._last: dict[str, float] = {}
+        self._newest: dict[str, float] = {}
+        self._measured = [
+            spec for spec in layout.of("output") if spec.axis is not None and spec.quantity
+        ]
+        self._bounds = {spec.name: _bound(spec, limits) for spec in self._measured}
+        self._commands = {
+            spec.name: self._command(spec, layout, units)
+            for spec in self._measured
+            if spec.quantity == "position" and watch.following_error is not None
+        }
 
     def __call__(self, played: Played) -> None:
         """Look at a block.
@@ -83,27 +120,22 @@ class Watcher:
         RigError
             If a measurement is beyond a limit or too far from its command, or none came.
         """
-        for spec in played.layout.of("output"):
+        for spec in self._measured:
             samples = played.samples.get(spec.name)
-            if spec.axis is None or spec.quantity is None:
-                continue
             if samples is not None and samples.time.size:
-                self._last[spec.name] = float(played.block.time[-1])
+                newest = float(np.max(samples.time))
+                if newest > self._newest.get(spec.name, -math.inf):
+                    self._newest[spec.name] = newest
+                    self._last[spec.name] = float(played.block.time[-1])
                 self._inside(spec, samples)
-                if spec.quantity == "position":
+                if spec.name in self._commands:
                     self._following(spec, samples, played)
             self._fresh(spec, played)
 
     def _inside(self, spec: ChannelSpec, samples: Samples) -> None:
-        limits = self._limits.get(spec.axis or "")
-        if limits is None or spec.quantity is None:
-            return
-        bound = getattr(limits, spec.quantity)
+        bound, factor, own = self._bounds[spec.name]
         if math.isinf(bound):
             return
-        order = ("position", "velocity", "acceleration").index(spec.quantity)
-        own = limits.unit if order == 0 else f"{limits.unit or '1'}/s{'²' if order == 2 else ''}"
-        factor = conversion_factor(spec.unit, to=own)
         k = int(np.argmax(np.abs(samples.values)))
         found = factor * float(samples.values[k])
         if not math.isfinite(found):
@@ -119,33 +151,34 @@ class Watcher:
             )
 
     def _following(self, spec: ChannelSpec, samples: Samples, played: Played) -> None:
+        source, theirs, ours, unit = self._commands[spec.name]
         allowed = self._watch.following_error
-        if allowed is None:
+        command = played.samples.get(source)
+        if allowed is None or command is None or not command.time.size:
             return
-        command = self._command(spec, played)
-        if command is None or not command.time.size:
-            return
-        wanted = np.interp(samples.time, command.time, command.values)
-        error = np.abs(samples.values - wanted)
+        wanted = theirs * np.interp(samples.time, command.time, command.values)
+        error = np.abs(ours * samples.values - wanted)
         k = int(np.argmax(error))
         if not error[k] <= allowed:
             raise RigError(
-                f"{spec.name} is {error[k]:.6g} {spec.unit} from its command at "
-                f"{samples.time[k]:.3f} s, more than the following error {allowed:g} {spec.unit} "
+                f"{spec.name} is {error[k]:.6g} {unit} from its command at "
+                f"{samples.time[k]:.3f} s, more than the following error {allowed:g} {unit} "
                 f"allowed; {self._name!r} is stopped"
             )
 
-    @staticmethod
-    def _command(spec: ChannelSpec, played: Played) -> Samples | None:
-        for other in played.layout.of("input"):
-            same = (other.axis, other.quantity, other.unit) == (
-                spec.axis,
-                "position",
-                spec.unit,
-            )
-            if same:
-                return played.samples.get(other.name)
-        return None
+    def _command(
+        self, spec: ChannelSpec, layout: Layout, units: Mapping[str, str]
+    ) -> tuple[str, float, float, str]:
+        """Command of a measured position, and the factors of both to the axis's unit."""
+        unit = units.get(spec.axis or "", spec.unit)
+        for other in layout.of("input"):
+            if (other.axis, other.quantity) == (spec.axis, "position"):
+                theirs = conversion_factor(other.unit, to=unit)
+                return other.name, theirs, conversion_factor(spec.unit, to=unit), unit
+        raise RigError(
+            f"the following error of {spec.name} is to be watched, and {self._name!r} records no "
+            f"commanded position of axis {spec.axis!r}; state one as an input, or leave it out"
+        )
 
     def _fresh(self, spec: ChannelSpec, played: Played) -> None:
         if self._stale is None:
@@ -154,5 +187,16 @@ class Watcher:
         silent = now - self._last.get(spec.name, 0.0)
         if silent > self._stale:
             raise RigError(
-                f"no sample of {spec.name} came for {silent:.3g} s; {self._name!r} is stopped"
+                f"no new sample of {spec.name} came for {silent:.3g} s; {self._name!r} is stopped"
             )
+
+
+def _bound(spec: ChannelSpec, limits: Mapping[str, Limits | None]) -> tuple[float, float, str]:
+    """Limit of a measured quantity, the factor to its unit, and that unit."""
+    given = limits.get(spec.axis or "")
+    bound = math.inf if given is None or spec.quantity is None else getattr(given, spec.quantity)
+    if given is None or spec.quantity is None or math.isinf(bound):
+        return math.inf, 1.0, ""
+    order = QUANTITIES.index(spec.quantity)
+    own = given.unit if order == 0 else f"{given.unit or '1'}/s{'²' if order == 2 else ''}"
+    return bound, conversion_factor(spec.unit, to=own), own

@@ -11,7 +11,7 @@ from hmpim.errors import ArgumentError, FormatError, RecordError, UnitError
 from hmpim.formats.readers import Contents, listed
 from hmpim.formats.roles import Roles
 from hmpim.record import Channel, Finding, Record, Series, rate_of
-from hmpim.record.mend import check_runs_on, mend, restarts
+from hmpim.record.mend import check_runs_on, mend, restarts, stands_still
 from hmpim.units import check_unit
 
 __all__ = ["assemble", "check_units", "cut_runs", "timed"]
@@ -103,13 +103,8 @@ def timed(series: Sequence[Series], *, fs: float | None) -> list[Series]:
     if fs is None:
         return list(series)
     return [
-        replace(s, time=None) if s.time is not None and _stands_still(s.time) else s for s in series
+        replace(s, time=None) if s.time is not None and stands_still(s.time) else s for s in series
     ]
-
-
-def _stands_still(time: NDArray[np.float64]) -> bool:
-    there = time[np.isfinite(time)]
-    return there.size == 0 or bool(np.all(there == there[0]))
 
 
 def cut_runs(series: Sequence[Series]) -> list[tuple[Series, ...]]:

@@ -1,5 +1,6 @@
 """Which channels of a file go in, come out, were asked for, or are merely kept."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from shlex import quote
@@ -74,7 +75,7 @@ def choose_roles(
         If a channel is named twice.
     """
     into = _choose("input", inputs, contents, INPUT_NAMES, OUTPUT_NAMES, file)
-    out = _choose("output", outputs, contents, OUTPUT_NAMES, INPUT_NAMES, file)
+    out = _choose("output", outputs, contents, OUTPUT_NAMES, INPUT_NAMES, file, taken=into)
     asked = _named("reference", references, contents, file)
     kept = _named("auxiliary", auxiliary, contents, file)
     # What a person names has that role, whatever the file states.
@@ -202,6 +203,7 @@ def _refuse_twins(wanted: str, contents: Contents, file: str) -> None:
         )
 
 
+_OF_A_STIMULUS = {"position", "velocity", "acceleration"}
 _COUNTS = {2: "two", 3: "three"}
 
 
@@ -212,6 +214,7 @@ def _choose(
     known: tuple[str, ...],
     others: tuple[str, ...],
     file: str,
+    taken: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
     """The channels of one kind: those asked for, those stated, or the one with a usual name."""
     chosen = _named(kind, wanted, contents, file) or _stated(contents, kind)
@@ -229,8 +232,18 @@ def _choose(
             f"{file!r} has {len(usual)} columns that may be the {kind} "
             f"({', '.join(usual)}); say which with {kind}s=[...] or --{kind}"
         )
-    free = [name for name in names if name.casefold() not in others]
-    example = free[0] if free else known[0]
+    if {re.split("[./]", name)[-1] for name in names} == _OF_A_STIMULUS:
+        raise FormatError(
+            f"{file!r} holds position, velocity and acceleration, as a stimulus does, and no "
+            f"{kind} is named; play it with hmpim run and identify the record, or name --{kind}"
+        )
+    left = [name for name in names if name not in taken]
+    if not left:
+        raise FormatError(
+            f"{file!r} has no column for the {kind}; its columns are {_listed(contents)}, and an "
+            "input and an output are needed"
+        )
+    example = next((name for name in left if name.casefold() not in others), left[0])
     raise FormatError(
         f"{file!r} does not say which column is the {kind}; its columns are {_listed(contents)}: "
         f"name it with {kind}s=[{example!r}] or --{kind} {quote(example)}"

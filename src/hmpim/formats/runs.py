@@ -20,9 +20,9 @@ from hmpim.identify import Identification, Parameters
 from hmpim.record import Record
 from hmpim.units import conversion_factor
 
-__all__ = ["Folder", "Run", "asked_of", "filter_runs", "find_runs"]
+__all__ = ["Folder", "Run", "asked_of", "files_of", "filter_runs", "find_runs"]
 
-_SCHEMA = "hmpim/identification/"
+_RESULT = re.compile(rb'^[^"]*"schema":\s*"hmpim/identification/')
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _PARAMETERS = tuple(f.name for f in fields(Parameters))
 _WORDS = ("name", "source", "rig", "input", "output", "verdict", "created")
@@ -154,6 +154,12 @@ def find_runs(folder: str | PathLike[str]) -> Folder:
     )
 
 
+def files_of(found: Folder, folder: Path) -> list[Path]:
+    """Return every file of the runs in a folder, damaged ones included."""
+    whole = [path for run in found.runs for path in (run.record, run.result) if path is not None]
+    return [*whole, *(folder / name for name, _ in found.unreadable)]
+
+
 def filter_runs(runs: Sequence[Run], conditions: Sequence[str]) -> tuple[Run, ...]:
     """Keep the runs that meet every condition.
 
@@ -238,7 +244,7 @@ def _kind(path: Path) -> str:
         return "file"
     if head.startswith(b"# " + MARK.encode()):
         return "table"
-    return "result" if head[:1] == b"{" and _SCHEMA.encode() in head[:400] else ""
+    return "result" if head[:1] == b"{" and _RESULT.search(head[:400]) else ""
 
 
 def _joined(

@@ -214,8 +214,10 @@ def _read_result(path: Path) -> Identification:
             _check_covariance(pair)
     except (FormatError, ArgumentError) as error:
         raise FormatError(f"{str(path)!r}: {error}") from None
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise FormatError(f"{str(path)!r} is not a whole result: {error!r}") from error
+    except KeyError as error:
+        raise FormatError(f"{str(path)!r} is not a whole result: {error} is missing") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise FormatError(f"{str(path)!r} is not a whole result: {error}") from error
     return result
 
 

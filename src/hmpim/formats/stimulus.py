@@ -142,7 +142,7 @@ def save_stimulus_csv(stimuli: Stimulus | Sequence[Stimulus], path: str | PathLi
                 continue
             names.append(prefix + name if name != "time" else name)
             columns.append(values)
-        lines.append(_comment(stimulus))
+        lines.append(f"{_comment(stimulus)}, samples = {columns[0].size}")
     lines.append(",".join(names))
     rows = np.column_stack(columns).tolist()
     lines += [",".join(map(repr, row)) for row in rows]

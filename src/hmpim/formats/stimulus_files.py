@@ -265,7 +265,7 @@ def read_stimulus(path: str | PathLike[str]) -> list[Stimulus] | list[PlayedStim
     except (OSError, KeyError, ValueError, IndexError, TypeError, NotImplementedError) as error:
         raise FormatError(f"{str(path)!r} cannot be read as a stimulus: {error}") from error
     if not found:
-        raise FormatError(f"{str(path)!r} holds no stimulus")
+        raise FormatError(f"{str(path)!r} holds no stimulus; make one with hmpim design")
     return found
 
 
@@ -335,6 +335,7 @@ def _read_hdf5(path: Path) -> list[PlayedStimulus]:
                 acceleration=np.asarray(group["acceleration"][()], dtype=np.float64),
             )
             for group in file.values()
+            if "axis" in group.attrs
         ]
 
 
@@ -352,8 +353,8 @@ def _read_mat(path: Path) -> list[PlayedStimulus]:
             velocity=np.atleast_1d(s["velocity"]),
             acceleration=np.atleast_1d(s["acceleration"]),
         )
-        for name, s in structs.items()
-        if not name.startswith("__")
+        for s in structs.values()
+        if isinstance(s, dict) and "axis" in s
     ]
 
 
@@ -388,6 +389,7 @@ def _read_csv(path: Path) -> list[PlayedStimulus]:
     if not rows or not comments:
         raise FormatError(f"{str(path)!r} has no heading of a stimulus; make one with hmpim design")
     names = rows[0].split(",")
+    _refuse_cut(path, rows, comments[0])
     table = np.array([[float(v) for v in row.split(",")] for row in rows[1:]])
     columns = dict(zip(names, table.T, strict=True))
     found = []
@@ -410,6 +412,18 @@ def _read_csv(path: Path) -> list[PlayedStimulus]:
             )
         )
     return found
+
+
+def _refuse_cut(path: Path, rows: Sequence[str], comment: str) -> None:
+    """Refuse a table that is cut short, which would end the motion before it comes to rest."""
+    whole = [row for row in rows[1:] if row.count(",") == rows[0].count(",")]
+    stated = re.search(r", samples = (\d+)", comment)
+    samples = len(rows) - 1 if stated is None else int(stated[1])
+    if not len(whole) == len(rows) - 1 == samples:
+        raise FormatError(
+            f"{str(path)!r} is damaged: {len(whole)} of its {samples} samples are whole; copy it "
+            "again, or save the stimulus anew"
+        )
 
 
 def _band(comment: str) -> tuple[float, float] | None:

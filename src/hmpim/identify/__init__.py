@@ -36,6 +36,7 @@ from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.statistics import LiveEstimator, Look, Statistics, compress
 from hmpim.identify.uses.compare import Change, compare
 from hmpim.identify.uses.gain_phase import GainPhase, gain_and_phase, measurable
+from hmpim.identify.uses.nonlinear import left_out
 from hmpim.identify.uses.predict import Prediction, has_model, predict, to_model
 from hmpim.identify.uses.validate import Bounds, Check, OutputValidation, Validation, validate
 
@@ -83,6 +84,7 @@ __all__ = [
     "identify",
     "identify_levels",
     "identify_repeats",
+    "left_out",
     "local_response",
     "measurable",
     "paper_analysis",

@@ -53,6 +53,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.worth import WORTH
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.response import response_std
 from hmpim.record import Finding
 
@@ -188,7 +189,15 @@ def _pair(
         residual=fit.residual if course is None else fit.residual * course,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
         nonlinearity=None if inspection is None else _summary(inspection, joined, units),
+        nonlinear_part=_nonlinear_part(question, joined),
     )
+
+
+def _nonlinear_part(question: Question, joined: OutputFit) -> NonlinearPart | None:
+    """The nonlinearity that the model includes."""
+    if question.limited is not None:
+        return question.limited.part(question.aligned.fs)
+    return None if joined.bending is None else joined.bending.part
 
 
 def _summary(inspection: Inspection, joined: OutputFit, units: tuple[str, str]) -> Nonlinearity:

@@ -15,6 +15,7 @@ from hmpim.model.dynamics import (
 from hmpim.model.margin import AddedPhase, Margin, add_to_loop
 from hmpim.model.mode import Mode
 from hmpim.model.model import Model, frequency_response, simulate
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.response import (
     PeakGain,
     RationalDelay,
@@ -37,6 +38,7 @@ __all__ = [
     "Margin",
     "Mode",
     "Model",
+    "NonlinearPart",
     "PeakGain",
     "RationalDelay",
     "Readout",

@@ -20,7 +20,9 @@ from hmpim.model.discrete import (
     discretise,
     rows_between,
 )
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.response import RationalDelay
+from hmpim.model.stepped import SteppedPart, stepped_part
 from hmpim.record import Intersample
 
 __all__ = ["Chain", "Readout", "chain_of", "run_chain"]
@@ -81,6 +83,8 @@ class Chain:
         Whether the rows of `pieces` act on the last outputs, newest first, and not on the state.
     error : float
         Greatest relative error of the response up to `step.band`.
+    nonlinear : SteppedPart or None
+        The nonlinear part.
     """
 
     step: Discrete
@@ -90,6 +94,7 @@ class Chain:
     pieces: tuple[RowPiece, ...]
     over_outputs: bool
     error: float
+    nonlinear: SteppedPart | None = None
 
 
 def chain_of(
@@ -99,6 +104,7 @@ def chain_of(
     fs: float,
     intersample: Intersample,
     band: float | None = None,
+    nonlinear: NonlinearPart | None = None,
 ) -> Chain:
     """Put a model on a rate.
 
@@ -114,12 +120,15 @@ def chain_of(
         What the input does between its samples.
     band : float, optional
         Frequency in Hz up to which a band-limited input has content.
+    nonlinear : NonlinearPart, optional
+        What is not linear.
 
     Raises
     ------
     ArgumentError
         If the delay would need input samples that are still to come, the rate is not positive,
-        or the hold's period is shorter than a fiftieth of a sample.
+        the hold's period is shorter than a fiftieth of a sample, or a held output is behind a
+        nonlinearity other than of the command.
     """
     integrates = bool(system.denominator[0] == 0.0)
     level = 0.0 if integrates else float(system.numerator[0] / system.denominator[0])
@@ -128,6 +137,11 @@ def chain_of(
         raise ArgumentError(
             f"hold_period = {period!r} s is less than a fiftieth of a sample of {1 / fs:.6g} s and "
             "makes no difference; leave it None"
+        )
+    stepped = None
+    if nonlinear is not None:
+        stepped = stepped_part(
+            nonlinear, system, fs=fs, intersample=intersample, held=period is not None
         )
     pieces: tuple[RowPiece, ...] = ()
     over_outputs = False
@@ -150,6 +164,7 @@ def chain_of(
         pieces=pieces,
         over_outputs=over_outputs,
         error=step.error + between_error,
+        nonlinear=stepped,
     )
 
 
@@ -231,13 +246,18 @@ def run_chain(chain: Chain, u: _Real, *, rng: np.random.Generator | None = None)
     >>> run_chain(chain, np.array([0.0, 1.0, 2.0, 3.0, 4.0])).tolist()
     [0.0, 0.0, 1.0, 1.0, 3.0]
     """
-    readout = chain.readout
+    readout, nonlinear = chain.readout, chain.nonlinear
+    if nonlinear is not None:
+        u = nonlinear.entered(u)
     rest = 0.0 if chain.integrates else float(u[0])
     played = _play(chain.step, u - rest)
     base = chain.level * rest + readout.bias
     index: NDArray[np.int64] | None = None
     if readout.hold_period is None:
         reading = base + played.output
+        if nonlinear is not None:
+            x = reading - readout.bias
+            reading = reading + nonlinear.effect(u, x, chain.level * rest)
     else:
         newest, index = _readings(chain, u.size)
         reading = base + _between(chain, played, newest)

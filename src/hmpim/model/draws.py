@@ -94,9 +94,9 @@ def draw_models(
 ) -> tuple[Model, ...]:
     """Draw models as likely as the record leaves them.
 
-    Delay and coefficients are drawn together from their covariance, bias, noise, levels, hold and
-    rounding each from its own standard deviation. A draw that no `Model` can be, such as an
-    unstable one, is drawn again.
+    Delay and coefficients are drawn together from their covariance; bias, noise, levels, hold,
+    rounding and the size of a nonlinear part each from its own standard deviation. A draw that no
+    `Model` can be, such as an unstable one, is drawn again.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
 
     noise = moved(model.noise_std, spread.noise_std)
     assert noise is not None
-    return replace(
+    drawn = replace(
         with_coefficients(model, vector),
         bias=moved(model.bias, spread.bias) or 0.0,
         noise_std=abs(noise),
@@ -179,3 +179,8 @@ def _one(model: Model, vector: NDArray[np.float64], source: np.random.Generator)
         quantization_step=moved(model.quantization_step, spread.quantization_step),
         spread=None,
     )
+    part = model.nonlinear
+    if part is None:
+        return drawn
+    size = part.size + part.std * source.standard_normal()
+    return replace(drawn, nonlinear=replace(part, size=size))

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
+from hmpim.model.driven import driven
 from hmpim.model.filters import in_z
 from hmpim.model.mode import Mode, modes_of
-from hmpim.model.poles import rational_response
+from hmpim.model.nonlinear import NonlinearPart, followed_command, nonlinear_effect
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import prepare_input
 from hmpim.model.spread import Spread
@@ -57,6 +58,9 @@ class Model:
         Frequency in Hz up to which it was excited.
     spread : Spread or None
         What is known of the errors of these figures.
+    nonlinear : NonlinearPart or None
+        A backlash, dead zone, friction, spring or limited speed that the unit has as well; None
+        of a linear unit.
 
     Raises
     ------
@@ -84,6 +88,7 @@ class Model:
     fs: float | None = None
     band: float | None = None
     spread: Spread | None = None
+    nonlinear: NonlinearPart | None = None
 
     def __post_init__(self) -> None:
         for name in ("numerator", "denominator"):
@@ -160,6 +165,12 @@ class Model:
             quantization_step=self.quantization_step,
         )
 
+    def within(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The output, (n,), kept within its range; as it is where there is none."""
+        if self.saturation_low is None and self.saturation_high is None:
+            return y
+        return np.clip(y, self.saturation_low, self.saturation_high)
+
     def at_rate(self, fs: float, *, intersample: Intersample | None = None) -> Chain:
         """Put the model on a rate in Hz: the arithmetic that `simulate` and the exports share.
 
@@ -175,6 +186,7 @@ class Model:
             fs=fs,
             intersample=_known(intersample or self.intersample),
             band=self.band,
+            nonlinear=self.nonlinear,
         )
 
     def simulate(
@@ -324,7 +336,10 @@ def simulate(
     intersample: Intersample,
     rng: np.random.Generator | int | None = None,
 ) -> NDArray[np.float64]:
-    """Output of the linear part for a sampled input, which stood at u[0] before.
+    """Output of the unit for a sampled input, which stood at u[0] before.
+
+    It is that of the linear part and, if the model has one, of its nonlinear part; without
+    saturation, hold and rounding.
 
     It has the whole record at hand and so looks ahead between samples; `Model.simulate` steps
     through the whole chain, causally.
@@ -359,18 +374,16 @@ def simulate(
     samples = np.atleast_1d(numbers_of("u", u))
     if samples.size < 2:
         raise ArgumentError(f"u has {samples.size} samples; give two or more")
-    system = model.system
+    part = model.nonlinear
+    if part is not None and intersample != model.intersample:
+        part = replace(part, between=intersample)
+    if part is not None and part.kind == "rate_limit":
+        samples = followed_command(part, samples, fs)
     source = prepare_input(samples, intersample)
-    y = rational_response(
-        source,
-        delay=system.delay * fs,
-        numerator=system.numerator * fs ** np.arange(system.numerator.size),
-        denominator=system.denominator * fs ** np.arange(system.denominator.size),
-    )
-    level: float | NDArray[np.float64] = float(system.numerator[0]) * source.first
-    if system.denominator[0] == 0:
-        level = level * np.maximum(np.arange(source.samples) / fs - system.delay, 0.0)
-    y = y + level + model.bias
+    y = driven(model.system, source, fs)
+    if part is not None:
+        y = y + nonlinear_effect(part, model.system, samples, source, fs)
+    y = y + model.bias
     if rng is not None:
         y = y + model.noise_std * generator(rng).standard_normal(y.size)
     return np.asarray(y)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hmpim.identify.judgement.reach import lines_of
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.optimal.fisher import fisher_information, standard_deviations
 from hmpim.optimal.wish import PARAMETERS, Family, Gentle, Wish
@@ -19,6 +20,7 @@ __all__ = [
     "cost_of",
     "gentleness",
     "gentler",
+    "has_lines",
     "needed_gain",
     "shortfall",
     "try_out",
@@ -31,6 +33,9 @@ FULL = 1.0 + 1e-9
 
 COVERED = 1.005
 """Shortfall up to which a band counts as reached: its end is seen in bins."""
+
+_LINES = 3
+"""Gain and phase at so many lines are two numbers more than the four figures of the model."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,6 +121,23 @@ def shortfall(position: FloatArray, wish: Wish) -> float:
     1.34
     """
     return max(1.0, wish.reach / excited_band(position, wish.fs)[1])
+
+
+def has_lines(position: FloatArray) -> bool:
+    """Whether a stimulus excites enough frequencies for the model, as `hmpim.identify` sees them.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+        Samples. Of a few periods of the unit only, what is excited is hardly more than one line.
+
+    Examples
+    --------
+    >>> time = np.arange(400) / 200
+    >>> has_lines(np.sin(2 * np.pi * 5 * time)), has_lines(np.sin(20 * time**2))
+    (False, True)
+    """
+    return lines_of(position).count >= _LINES
 
 
 def gentleness(stimulus: Stimulus, gentle: Gentle) -> float:

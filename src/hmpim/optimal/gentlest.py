@@ -11,7 +11,7 @@ import numpy as np
 from hmpim.arguments import checked
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.optimal.bound import least_share
-from hmpim.optimal.candidate import FULL, Candidate, gentleness, gentler
+from hmpim.optimal.candidate import FULL, Candidate, gentleness, gentler, has_lines
 from hmpim.optimal.fisher import Errors, predict_errors
 from hmpim.optimal.multisine import best_multisine
 from hmpim.optimal.sweeps import best_sweep
@@ -366,14 +366,16 @@ def _shortest(family: Family, wish: Wish, step: Step) -> Candidate | None:
         if near is not None and family == "multisine" and (best is None or best.use > FULL):
             best = gentler(best, _at(family, wish, total, None, step))  # a second look costs little
         near = best or near
-        tried = near if near is not None and _lasts(near, total, wish) else None
+        lasting = near if near is not None and _lasts(near, total, wish) else None
+        told = lasting is not None and has_lines(lasting.stimulus.position)
+        tried = lasting if told else None
         if tried is not None and tried.use <= FULL:
             enough, enough_at = tried, total
         else:
             short_at = max(short_at, total)
             short_use = math.inf if tried is None else tried.use
         if short_at >= wish.duration - 0.5 / wish.fs:
-            return gentler(enough, tried)
+            return gentler(enough, lasting)
         if enough is not None and enough_at - max(short_at, wish.shortest) <= max(
             _CLOSE * enough_at, 1.0 / wish.fs
         ):

@@ -345,12 +345,23 @@ class Wish:
                 "no limit is finite, so any accuracy takes no time at all; "
                 "give a position, velocity or acceleration limit"
             )
+        self._check_range()
         highest = max(m.natural_frequency for m in self.models())
         if highest > 0.3 * self.fs:
             raise ArgumentError(
                 f"natural_frequency up to {highest:g} Hz is not seen at fs = {self.fs:g} Hz; "
                 f"sample at {math.ceil(highest / 0.3):g} Hz or faster"
             )
+
+    def _check_range(self) -> None:
+        """Refuse a rough model outside its own range."""
+        for name in ("natural_frequency", "damping_ratio"):
+            rough, given = getattr(self.model, name), getattr(self.model_range, name)
+            if given is not None and not given[0] <= rough <= given[1]:
+                raise ArgumentError(
+                    f"{name} = {rough:g} is outside its range, {given[0]:g} to {given[1]:g}; give "
+                    "one within it"
+                )
 
     def models(self, *, finer: int = 1) -> tuple[RoughModel, ...]:
         """Models over the range, the accuracy being wanted of each."""

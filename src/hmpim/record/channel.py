@@ -1,7 +1,7 @@
 """One signal on its own clock, and what it may do between its samples."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from hmpim.errors import RecordError
 from hmpim.tables import shortened
 from hmpim.units import check_unit
 
-__all__ = ["BETWEEN", "Channel", "Intersample", "frozen_samples"]
+__all__ = ["BETWEEN", "Channel", "Intersample", "frozen_samples", "in_seconds"]
 
 Intersample = Literal["zoh", "foh", "bandlimited", "sampled"]
 """Held, linear or band-limited between its samples; or software, which sees the samples alone."""
@@ -100,6 +100,11 @@ def frozen_samples(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise RecordError(
             f"channel {name!r} is complex; give real numbers: the real part, or two channels"
         )
+    if getattr(values, "dtype", np.dtype(float)).kind in "mM":
+        raise RecordError(
+            f"channel {name!r} holds dates or durations; give numbers, of a time in s, such as "
+            "(time - time[0]) / np.timedelta64(1, 's')"
+        )
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -110,6 +115,22 @@ def frozen_samples(name: str, values: ArrayLike) -> NDArray[np.float64]:
         )
     array.setflags(write=False)
     return array
+
+
+def in_seconds(time: ArrayLike) -> NDArray[Any]:
+    """Return dates in s since the first, durations in s, and numbers as they are.
+
+    Examples
+    --------
+    >>> in_seconds(np.array(["2026-03-01T12:00:00.000", "2026-03-01T12:00:00.005"], "datetime64"))
+    array([0.   , 0.005])
+    >>> in_seconds(np.array([5], "timedelta64[ms]")), in_seconds([0.5])
+    (array([0.005]), array([0.5]))
+    """
+    array = np.asanyarray(time)
+    if array.dtype.kind == "M":
+        array = array - array[:1]
+    return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array
 
 
 def _hidden(values: ArrayLike) -> NDArray[np.bool_] | None:

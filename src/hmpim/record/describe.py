@@ -131,7 +131,7 @@ def _channel(
     series: Series, time: NDArray[np.float64] | None, fs: float | None, reverse: str
 ) -> tuple[Channel | None, str]:
     if time is None:
-        return None, "it has no time: name it with --time, or give the rate with --fs"
+        return None, "no time is known; name it with --time, or give the rate with --fs"
     if reverse:
         return None, f"time {reverse}"
     unit = series.unit

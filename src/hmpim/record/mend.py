@@ -12,7 +12,15 @@ from hmpim.record.channel import Channel
 from hmpim.record.finding import Finding
 from hmpim.record.series import Series
 
-__all__ = ["Mended", "backward_words", "check_runs_on", "check_span", "mend", "restarts"]
+__all__ = [
+    "Mended",
+    "backward_words",
+    "check_runs_on",
+    "check_span",
+    "mend",
+    "restarts",
+    "stands_still",
+]
 
 _LATE = 8
 """Samples that may follow a stamp that ran ahead before the stamps count as starting again.
@@ -185,6 +193,8 @@ def _ordered(
     doubled = int(order.size - np.count_nonzero(first))
     if not doubled:
         return time[order], order
+    if stands_still(time[order]):
+        raise RecordError(_still_words(time[order], of))
     differ = any(_differs(s.values[order], first) for s in sharing)
     spread = _spread(time[order]) if differ else None
     repeat = f"{doubled} of {time.size} stamps of {of} repeat the one before"
@@ -202,15 +212,39 @@ def _ordered(
         )
     else:
         order = order[first]
-        if order.size < 2:
-            raise RecordError(
-                f"time of {of} stands still: all {time.size} samples are stamped "
-                f"{time[order[0]]:.9g} s; name the column of the time with --time, or give the "
-                "rate with --fs (in Python: time=..., fs=...)"
-            )
         message = f"{repeat}; the first sample of each is kept"
     findings.append(Finding(code="doubled_stamps", message=message, severity="info", parameters=()))
     return (time[order] if spread is None else spread), order
+
+
+def stands_still(time: NDArray[np.float64]) -> bool:
+    """Say whether stamps tell no rate: all are equal, or many samples share two or three.
+
+    Of the first and the last some is missing, and one whole tick has no length of its own.
+
+    Examples
+    --------
+    >>> stands_still(np.full(3, 7.0)), stands_still(np.array([0.0, 0.1]))
+    (True, False)
+    >>> stands_still(np.repeat([0.0, 10.0], 500))
+    True
+    """
+    stamps = np.unique(time[np.isfinite(time)])
+    return stamps.size < 2 or (stamps.size < 4 and time.size >= _ENOUGH)
+
+
+def _still_words(time: NDArray[np.float64], of: str) -> str:
+    """What is wrong with a time that stands still, and what to do."""
+    stamps = np.unique(time)
+    wrong = (
+        f"time of {of} has {stamps.size} stamps for {time.size} samples, which tell no rate"
+        if stamps.size > 1
+        else f"time of {of} stands still: all {time.size} samples are stamped {time[0]:.9g} s"
+    )
+    return (
+        f"{wrong}; name the column of the time with --time, or give the rate with --fs "
+        "(in Python: time=..., fs=...)"
+    )
 
 
 def _without_strays(time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -294,11 +328,27 @@ def _spread(time: NDArray[np.float64]) -> NDArray[np.float64] | None:
 
 
 def _uniform(since: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
-    """The clock of one step that is nearest to the stamps, each part between pauses where it is."""
-    place, sizes = np.arange(since.size, dtype=np.float64), np.bincount(part)
-    middles = [np.bincount(part, weights=x) / sizes for x in (place, since)]
-    place, since = place - middles[0][part], since - middles[1][part]
-    return np.asarray(middles[1][part] + float(place @ since) / float(place @ place) * place)
+    """The clock of one step that is nearest to the stamps, each part between pauses where it is.
+
+    The step is that between the middles of whole ticks. A line through all samples is bent by the
+    first and the last tick of a part, some of which is missing.
+    """
+    place = np.arange(since.size, dtype=np.float64)
+    tick = np.cumsum(np.diff(since, prepend=since[0]) > 0, dtype=np.int64)
+    of = part[np.unique(tick, return_index=True)[1]]
+    inner = (np.diff(of, prepend=-1) == 0) & (np.diff(of, append=-1) == 0)
+    whole = inner[tick]
+    middle, stamp = (
+        x[whole] - _mean(x[whole], part[whole])[part[whole]]
+        for x in (_mean(place, tick)[tick], since)
+    )
+    place -= _mean(place, part)[part]
+    return np.asarray(_mean(since, part)[part] + (middle @ stamp) / (middle @ middle) * place)
+
+
+def _mean(values: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The mean of the values of each part."""
+    return np.asarray(np.bincount(part, weights=values) / np.bincount(part))
 
 
 def _wandering(since: NDArray[np.float64], part: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from hmpim.arguments import checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
-from hmpim.record.channel import Channel, Intersample, frozen_samples
+from hmpim.record.channel import Channel, Intersample, frozen_samples, in_seconds
 from hmpim.record.clock import rate_of
 from hmpim.record.finding import Finding
 from hmpim.record.stopping import Stopping
@@ -141,7 +141,7 @@ class Record(ByValue):
         fs : float, optional
             Sampling rate in Hz. Give this or `time`.
         time : array_like, shape (n,), optional
-            Time stamps in seconds. With both, `fs` is the nominal rate.
+            Time stamps in seconds, or dates. With both, `fs` is the nominal rate.
         units : mapping of str to str, optional
             Unit by channel name; a channel not named has none.
         band : tuple of float, optional
@@ -189,8 +189,8 @@ class Record(ByValue):
             assert fs is not None
             stamps: NDArray[Any] = np.arange(n) / fs
         else:
-            frozen_samples("time", time)
-            stamps = np.asanyarray(time)
+            stamps = in_seconds(time)
+            frozen_samples("time", stamps)
         units = units or {}
         unknown = sorted(set(units) - set(named))
         if unknown:

@@ -17,7 +17,7 @@ _ADVICE = {
     "unrelated": "Check that both channels belong to one test.",
     "check_failed": "Report this, with the record: a check failed on it.",
     "not_identifiable": "Check the channels first; then excite more strongly or for longer.",
-    "time_unit": "Say what unit the time stamps have, or give the rate with `--fs`.",
+    "time_unit": "State the unit of the time stamps: `--time 'NAME [ms]'`.",
     "mixed_stamps": "Record with one clock for each channel.",
     "backward_stamps": "Sort the samples, or find out why the clock ran backwards.",
     "doubled_stamps": "Check the recorder: samples share a time stamp.",

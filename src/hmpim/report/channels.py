@@ -106,6 +106,11 @@ def _proposed(found: Survey, path: str) -> list[str]:
     proposal = found.proposal
     if all(d.problem and not d.restarts for d in found.descriptions):
         return ["No channel can be used as it is, so no input and output are proposed."]
+    if not proposal.outputs and any(d.restarts for d in found.descriptions):
+        return [
+            "Time starts again, so no input and output are proposed; name them with --input "
+            "and --output."
+        ]
     if not proposal.inputs or not proposal.outputs:
         return ["No input and output stand out; name them with --input and --output.", *_why(found)]
     options = [
@@ -199,7 +204,10 @@ def _odd(descriptions: Sequence[Description]) -> list[str]:
         if d.backward and (d.restarts or not d.problem):
             parts.append(f"{d.backward} stamps backward")
         if d.restarts:
-            parts.append(f"time starts again {d.restarts} times")
+            parts.append(
+                f"time starts again, so that there are {d.restarts + 1} recordings; take one with "
+                "--sweep N, or all with --sweep all"
+            )
         if d.jitter:
             parts.append(f"stamps stray by {100 * d.jitter:.2g} % of the interval (r.m.s.)")
         if d.problem and not d.restarts:

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hmpim.errors import ArgumentError
+from hmpim.errors import ArgumentError, RecordError
 from hmpim.formats.runs import Folder, Run
+from hmpim.identify import Identification
 from hmpim.identify.uses.compare import Change, compare
 from hmpim.plots.style import printable
 
@@ -57,7 +58,7 @@ def print_runs(folder: Folder, runs: Sequence[Run], console: "Console") -> None:
 
 
 def compare_runs(runs: Sequence[Run]) -> list[tuple[Run, tuple[Change, ...]]]:
-    """Hold the result of each run against that of the first.
+    """Compare the result of each run with that of the first; () where they share no parameter.
 
     Raises
     ------
@@ -72,7 +73,14 @@ def compare_runs(runs: Sequence[Run]) -> list[tuple[Run, tuple[Change, ...]]]:
         )
     first = told[0].found
     assert first is not None
-    return [(run, compare(run.found, first)) for run in told[1:] if run.found is not None]
+    return [(run, _compared(run.found, first)) for run in told[1:] if run.found is not None]
+
+
+def _compared(found: Identification, first: Identification) -> tuple[Change, ...]:
+    try:
+        return compare(found, first)
+    except RecordError:  # nothing in common
+        return ()
 
 
 def print_changes(
@@ -98,6 +106,10 @@ def print_changes(
     for name in ("Run", "Pair", "Parameter", "First", "This", "Deviations", ""):
         table.add_column(name)
     for run, found in changes:
+        if not found:
+            console.print(
+                Text(printable(f"{run.name} has no parameter in common with {first.name}."))
+            )
         shown = [c for c in found if c.changed or c.name in _SHOWN]
         for c in shown:
             cells = (
@@ -110,7 +122,8 @@ def print_changes(
                 "changed" if c.changed else "",
             )
             table.add_row(*(Text(printable(cell)) for cell in cells))
-    console.print(table)
+    if table.row_count:
+        console.print(table)
 
 
 def _found(run: Run) -> str:

@@ -15,7 +15,12 @@ _ROUNDING = 1e-9  # a stimulus solved onto a limit may stand a rounding error be
 
 
 def check_inside(
-    stimulus: Stimulus, limits: Limits, *, whose: str, samples: int | None = None
+    stimulus: Stimulus,
+    limits: Limits,
+    *,
+    whose: str,
+    samples: int | None = None,
+    from_rest: bool = False,
 ) -> None:
     """Refuse a stimulus that goes beyond limits, converted to their unit.
 
@@ -30,6 +35,8 @@ def check_inside(
         Whose limits they are, for the message.
     samples : int or None
         How many commands are sent, where more follow at rest; None for the stimulus's.
+    from_rest : bool
+        Whether the velocity step with which a waveform without a lead starts counts, too.
 
     Raises
     ------
@@ -62,6 +69,8 @@ def check_inside(
             continue
         peak = factor * max(getattr(stimulus.peaks, quantity), sent[order])
         shares.append((peak / limit, quantity, peak, limit, rate_label(limits.unit, order)))
+    if from_rest:
+        _check_start(stimulus, limits.acceleration / factor, whose=whose)
     share, quantity, peak, limit, unit = max(shares, default=(0.0, "", 0.0, 0.0, ""))
     if share > 1.0 + _ROUNDING:
         advice = (
@@ -72,6 +81,19 @@ def check_inside(
         raise LimitsError(
             f"peak {quantity} {peak:.6g} {unit} is beyond the limit {limit:.6g} {unit} of "
             f"{whose}; {advice}"
+        )
+
+
+def _check_start(stimulus: Stimulus, limit: float, *, whose: str) -> None:
+    """Refuse a start in motion that takes more than the acceleration limit, in its own unit."""
+    fs = stimulus.fs
+    x = stimulus.motion(np.arange(-1, 3) / fs).position
+    bend = (float(np.abs(np.diff(x, 2)).max()) - 8.0 * float(np.spacing(np.abs(x).max()))) * fs**2
+    if bend > limit * (1.0 + _ROUNDING):
+        unit = rate_label(stimulus.unit, 2)
+        raise LimitsError(
+            f"the stimulus starts in motion: its first commands take {bend:.6g} {unit} from rest, "
+            f"beyond the limit {limit:.6g} {unit} of {whose}; design it with lead='auto'"
         )
 
 
@@ -86,7 +108,9 @@ def _peaks_sent(stimulus: Stimulus, samples: int) -> tuple[float, float, float, 
     """
     fs = stimulus.fs
     x = stimulus.motion(np.arange(-1, samples) / fs).position
-    rounding = 4.0 * float(np.spacing(np.abs(x).max()))
+    peak = stimulus.peaks.velocity
+    late = peak * float(np.spacing(samples / fs)) if math.isfinite(peak) else 0.0
+    rounding = 4.0 * float(np.spacing(np.abs(x).max())) + late  # of positions, and of their times
     rate = float(np.abs(np.diff(x)).max()) - rounding
     bend = float(np.abs(np.diff(x[2:], 2)).max()) - 2.0 * rounding if x.size > 4 else 0.0
     return float(np.abs(x).max()), rate * fs, bend * fs * fs, 0.0

@@ -19,7 +19,7 @@ from hmpim.stimulus.profile import smooth_prbs, smooth_steps
 from hmpim.stimulus.repeated import repeated_sweeps
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.scale import check_limits_given
-from hmpim.stimulus.solve import largest_gain, smallest_extinction, sweep_peaks
+from hmpim.stimulus.solve import first_instant, largest_gain, smallest_extinction, sweep_peaks
 from hmpim.stimulus.spectrum import OverFrequency, Redesign, check_spectrum
 from hmpim.stimulus.stimulus import Stimulus
 from hmpim.stimulus.sweep import Sweep, check_band, check_positive
@@ -149,7 +149,8 @@ def design(
         room = under.upper
     core: Waveform
     if kind in _SWEEPS:
-        start = 1.0 / rate if ahead == 0.0 else None
+        first = first_instant(length, rate, backwards=kind == "reversed")
+        start = first if ahead == 0.0 else None
         if under is not None and extinction == "auto":
             extinction = _largest_extinction(kind, (low, high), length, room)
         core = _sweep(kind, (low, high), length, room, extinction, start)

@@ -19,7 +19,7 @@ from hmpim.stimulus.scale import KEEP
 from hmpim.stimulus.sweep import Sweep
 from hmpim.units import rate_label
 
-__all__ = ["largest_gain", "smallest_extinction", "sweep_peaks"]
+__all__ = ["first_instant", "largest_gain", "smallest_extinction", "sweep_peaks"]
 
 _FAR = 0.7
 """An excess from which no n within a step of 0.05 fits: it moves the log of either peak by 0.05
@@ -72,6 +72,20 @@ def sweep_peaks(
         velocity=max(peaks.velocity, float(abs(at.velocity[0]))),
         acceleration=max(peaks.acceleration, float(abs(at.acceleration[0]))),
     )
+
+
+def first_instant(duration: float, fs: float, *, backwards: bool) -> float:
+    """Time in s of the printed sweep's sample that is nearest to its singular instant, 0.
+
+    Run forwards that is 1/fs. Backwards it is how long before the end the last sample is taken.
+
+    Examples
+    --------
+    >>> first_instant(0.5, 10.0, backwards=True), first_instant(0.525, 10.0, backwards=True)
+    (0.1, 0.025)
+    """
+    steps = duration * fs
+    return round(steps - math.ceil(steps - 1e-6) + 1, 9) / fs if backwards else 1.0 / fs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

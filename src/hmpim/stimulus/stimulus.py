@@ -18,7 +18,7 @@ from hmpim.stimulus.motion import FloatArray, Motion, Peaks, Waveform
 from hmpim.stimulus.peaks import true_peaks
 from hmpim.stimulus.reverse import Reversed
 from hmpim.stimulus.sampled import SampledMotion
-from hmpim.stimulus.solve import sweep_peaks
+from hmpim.stimulus.solve import first_instant, sweep_peaks
 from hmpim.stimulus.sweep import Sweep, check_positive
 from hmpim.tables import html_table, shortened
 from hmpim.units import check_unit, rate_label
@@ -285,7 +285,8 @@ def _peaks(waveform: Waveform, fs: float) -> Peaks:
         return waveform.peaks
     printed = _unreversed(waveform)
     if isinstance(printed, Sweep):
-        return sweep_peaks(printed, start=1.0 / fs)
+        backwards = printed is not waveform
+        return sweep_peaks(printed, start=first_instant(printed.duration, fs, backwards=backwards))
     peaks = true_peaks(waveform)
     ends = waveform.motion(np.array([0.0, waveform.duration]))
     if ends.velocity.any() or ends.acceleration.any():

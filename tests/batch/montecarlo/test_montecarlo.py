@@ -101,6 +101,7 @@ def test_the_bound_is_met(seeds, tmp_path):
         ("{ uniform = [0.0, 0.1] }", "[[0.1]]", r"delay = \[0.1\] is no value"),
         ("{ uniform = [0.0, 0.1] }", "[0.0, -0.1]", "delay = -0.1 is out of range"),
         ("{ uniform = [0.0, 0.1] }", "1000", "delay = 1000 s is as long as a record of"),
+        ("[system]", "[system]\nscale_factor = 1e300", "scale_factor = 1e\\+300 is out of range"),
         ("[system]", "[system]\nscale_factor = 0", "scale_factor = 0 moves nothing"),
         ("natural_frequency = 4", "natural_frequency = 0", "natural_frequency = 0 is out of range"),
         ("[noise]", "[noise]\ncorrelation = 1.5", "correlation = 1.5 is out of range"),

@@ -69,6 +69,7 @@ def result_of(model: Model, *, fs: float = FS) -> Identification:
             ),
         ),
         covariance=np.diag((1e-3 * np.abs(vector)) ** 2),
+        nonlinear_part=model.nonlinear,
     )
     record = RecordSummary(fs=fs, samples=2000, sha256="0123abcd" * 8, source="bench 3")
     return Identification(record=record, pairs=(pair,))
@@ -100,7 +101,7 @@ def runner(library: Path, name: str) -> Callable[[np.ndarray], np.ndarray]:
         memory = ctypes.create_string_buffer(1 << 20)
         begin(memory, float(u[0]))
         seen = [(peek(memory, float(x)), step(memory, float(x))) for x in u]
-        assert all(a == b for a, b in seen)
+        assert all(a == b or np.isnan([a, b]).all() for a, b in seen)
         return np.array([y for _, y in seen])
 
     return run

@@ -11,7 +11,7 @@ import pytest
 
 from hmpim.errors import ArgumentError
 from hmpim.formats.models import export, fmu
-from hmpim.model import Model
+from hmpim.model import Model, NonlinearPart
 from tests_support import c_compiler
 
 from .conftest import FS, result_of
@@ -62,6 +62,21 @@ def test_fmpy_gets_the_numbers_of_the_model(written):
     assert found["time"] == pytest.approx(T)
     # FMPy reads the output before it sets the next input; a delay of a sample makes that right.
     assert found["y"] == pytest.approx(truth, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["backlash", "friction"])
+def test_fmpy_gets_the_numbers_of_a_model_that_is_not_linear(kind, tmp_path, monkeypatch):
+    monkeypatch.setattr(fmu, "PLATFORMS", fmu.PLATFORMS[:1])
+    place = "force" if kind == "friction" else "output"
+    part = NonlinearPart(kind=kind, at=place, size=0.2, std=0.01, reach=5.0)
+    model, u = replace(SECOND, nonlinear=part), walk()
+    (path,) = export(result_of(model), to="fmu", path=tmp_path / "axis.fmu")
+    signal = np.array(list(zip(T, u, strict=True)), dtype=[("time", float), ("u", float)])
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=T[-1], input=signal, output=["y"], output_interval=1 / FS
+    )
+    assert found["y"] == pytest.approx(model.simulate(u, T), abs=1e-6)
+    assert np.std(found["y"] - SECOND.simulate(u, T)) > 0.05
 
 
 BUILT_FOR = {

@@ -7,6 +7,7 @@ import scipy.io
 import sample_logs as samples
 from hmpim.errors import ArgumentError, FormatError
 from hmpim.formats import read
+from hmpim.formats.readers import Layout, reader_for
 
 T, U, Y = samples.TIME, samples.U, samples.Y
 
@@ -98,8 +99,9 @@ def test_a_rate_that_the_file_s_time_contradicts_is_refused(kind, tmp_path):
 
 def test_a_rate_stands_in_for_a_time_that_stands_still(tmp_path):
     path = tmp_path / "run.csv"
-    np.savetxt(path, np.c_[0 * T, U, Y], delimiter=",", header="t,u,y", comments="")
-    assert_delay(read(path, fs=samples.FS))
+    for time in (0 * T, np.where(T.mean() > T, 0.0, 10.0)):
+        np.savetxt(path, np.c_[time, U, Y], delimiter=",", header="t,u,y", comments="")
+        assert_delay(read(path, fs=samples.FS))
 
 
 def test_a_time_of_another_length_is_said(tmp_path):
@@ -112,3 +114,48 @@ def test_a_name_to_copy_is_quoted_for_the_shell(tmp_path):
     path = mat(tmp_path / "m.mat", data=np.c_[U, Y])
     with pytest.raises(FormatError, match=r"--input 'data\(:,1\)'$"):
         read(path, fs=samples.FS)
+
+
+@pytest.mark.parametrize("kind", ["csv", "mat"])
+@pytest.mark.parametrize(
+    ("name", "start", "step", "codes"),
+    [
+        ("time", 0.0, 5.0, ["time_unit"]),
+        ("time", 46082.4, 0.005 / 86400, ["time_unit"]),
+        ("time", 46082.4, 0.005, []),
+        ("time", 0.0, 5e-8, []),
+        ("time [ms]", 0.0, 5.0, []),
+        ("time [d]", 46082.4, 0.005 / 86400, []),
+    ],
+)
+def test_time_in_ms_or_days_that_states_no_unit_is_remarked(
+    kind, name, start, step, codes, tmp_path
+):
+    """It had been taken for s without a word: 0.2 Hz, or 17 MHz, for 200 Hz."""
+    path = tmp_path / f"a.{kind}"
+    t, u = start + step * np.arange(60), np.sin(np.arange(60))
+    if kind == "csv":
+        np.savetxt(path, np.c_[t, u, u], delimiter=",", header="time,u,y", comments="")
+    else:
+        mat(path, time=t, u=u, y=u)
+    record = read(path, time=name if "[" in name else None)
+    assert [f.code for f in record.findings if f.code == "time_unit"] == codes
+
+
+@pytest.mark.parametrize(
+    ("index", "time"),
+    [
+        (lambda k: f"2026-03-01 10:00:{k / 200:06.3f}", None),
+        (lambda k: f"{k / 200}", "column 1"),
+    ],
+    ids=["dates", "seconds"],
+)
+def test_an_index_of_pandas_without_a_name_may_be_the_time(index, time, tmp_path):
+    """It was dropped without a word, as one that counts the rows still is."""
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{index(k)},{k % 7},{k % 5}\n" for k in range(60))
+    path.write_text(",u,y\n" + rows)
+    assert read(path, time=time).fs == pytest.approx(200.0)
+    path.write_text(",time,u,y\n" + "".join(f"{k},{k / 200},{k % 7},{k % 5}\n" for k in range(60)))
+    found = reader_for(path).channels(path, Layout())
+    assert (found.time, [c.name for c in found.channels]) == ("time", ["u", "y"])

@@ -1,6 +1,7 @@
 """A record that grows as samples come: nothing that was appended is lost, whatever happens."""
 
 import os
+import sys
 
 import h5py
 import numpy as np
@@ -272,3 +273,18 @@ def test_samples_that_no_record_may_hold_are_mended_when_read(tmp_path):
     assert [f.code for f in found.findings] == ["backward_stamps", "missing_samples"]
     assert found.outputs[0].values[-3:].tolist() == [1.0, 2.0, 3.0]
     assert hmpim.read(path) == found
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no such limit")
+def test_a_file_that_the_system_cuts_short_is_refused_with_its_reason_and_leaves_nothing(tmp_path):
+    """The library says it as a RuntimeError when it closes the file."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(ArgumentError, match=r"r\.h5' cannot be written: .*File too large"):
+            RecordWriter(tmp_path / "r.h5", LAYOUT, fs=FS, samples=100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not any(tmp_path.iterdir())

@@ -5,8 +5,8 @@ import pytest
 
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.mechanisms import rate_limited
 from hmpim.model import STRUCTURES, prepare_input
+from hmpim.model.operators import rate_limited
 from hmpim.model.sampled import delayed_response
 
 FS = 200.0

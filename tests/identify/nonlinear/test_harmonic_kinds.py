@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from hmpim.identify.nonlinear.harmonics import any_harmonics, sweep_harmonics
-from hmpim.identify.nonlinear.mechanisms import compare_harmonics, hypotheses, play, rate_limited
+from hmpim.identify.nonlinear.mechanisms import compare_harmonics, hypotheses
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
+from hmpim.model.operators import play, rate_limited
 from hmpim.model.sampled import delayed_response, prepare_input
 from tests_support import assert_share
 

@@ -6,10 +6,10 @@ import scipy
 
 import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
-from hmpim.identify.nonlinear.fine import FINE, linear_part, linear_part_finely
-from hmpim.identify.nonlinear.mechanisms import play
-from hmpim.identify.nonlinear.rows import _stick_slip
+from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.model import STRUCTURES, prepare_input
+from hmpim.model.fine import FINE
+from hmpim.model.operators import play, stick_slip
 from tests_support import in_studies
 
 FS, DELAY, OMEGA, ZETA = 200.0, 0.03, 2 * np.pi * 10.0, 0.4
@@ -147,7 +147,7 @@ def test_sticking_and_slipping_as_by_an_integrator_with_events():
     time = np.arange(n + 1) / FINE
     command = 0.5 * np.sin(0.4 * time)
     between = 0.5 * (command[:-1] + command[1:])
-    positions, moves = _stick_slip(step, between, 0.0, force, inertia)
+    positions, moves = stick_slip(step, between, 0.0, force, inertia)
     y = v = 0.0
     fine, reference = 200, []
     for k in range(n):

@@ -8,11 +8,12 @@ from hmpim import Record, identify
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.fitting.plainer import plainer
-from hmpim.identify.nonlinear.mechanisms import compare_mechanisms, play, rate_limited
+from hmpim.identify.nonlinear.mechanisms import compare_mechanisms
 from hmpim.identify.nonlinear.nonlinearity import inspect_nonlinearity
 from hmpim.identify.records.levels import compare_levels
 from hmpim.identify.threads import one_thread
 from hmpim.model import STRUCTURES, prepare_input
+from hmpim.model.operators import play, rate_limited
 from hmpim.rigs import Sensor
 from tests_support import assert_share, in_studies
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hmpim
-from hmpim.identify.nonlinear.mechanisms import rate_limited
 from hmpim.identify.nonlinear.speed import limited_command
+from hmpim.model.operators import rate_limited
 
 FS, FINE = 200.0, 20
 

@@ -51,8 +51,18 @@ def test_draws_scatter_as_the_response_is_uncertain(found):
     assert scatter == pytest.approx(stated, rel=0.1)
 
 
-def test_predictions_are_of_the_linear_part(found):
+def test_predictions_keep_within_the_range_of_the_output(found):
     prediction = hmpim.predict(found["y", "u"], found.data)
-    assert prediction.predicted.max() > 8.5  # a clipped output is held against what it would be
+    high = found["y", "u"].saturation_high.value
+    assert prediction.predicted.max() == high
+    open_ = hmpim.to_model(found["y", "u"], fs=200.0)
+    u = found.data.inputs[0].values
+    free = hmpim.simulate(open_, u, fs=200.0, intersample=open_.intersample)
+    assert free.max() > 8.5
+    assert prediction.predicted.tolist() == np.minimum(free, high).tolist()
+    assert prediction.findings == ()
+
+
+def test_a_result_without_a_covariance_has_no_spread(found):
     pair = replace(found["y", "u"], covariance=None)
     assert hmpim.to_model(pair).spread is None

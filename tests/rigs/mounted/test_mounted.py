@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hmpim.errors import ArgumentError, RigError
-from hmpim.experiment import run
+from hmpim.experiment import ManualClock, RunOptions, run
 from hmpim.identify import identify
 from hmpim.rigs import (
     CarriedSensor,
@@ -65,6 +65,27 @@ PLAIN = ["second_order", "third_order"]
 
 def near(estimate, truth, *, at_least=0.0):
     return abs(estimate.value - truth) < max(4.5 * estimate.spread, at_least)
+
+
+class Paced(Axis):
+    """A carrier that sends each command when it is due, by the clock of the run."""
+
+    def use_clock(self, clock):
+        self.clock = clock
+
+    def play(self, block):
+        for _ in block.due():
+            pass
+        return super().play(block)
+
+
+def test_an_encoder_is_stamped_as_its_command_is_and_all_go_by_the_clock_of_the_run():
+    clock = ManualClock(late=np.array([0.0, 0.003, 0.001]))
+    carrier = Paced()
+    record = run(Mounted(carrier, SEEKER), SWEEP, rng=1, options=RunOptions(clock=clock))
+    assert np.array_equal(record.outputs[0].time, record.inputs[0].time)
+    assert not np.array_equal(record.outputs[0].time, SWEEP.time)
+    assert carrier.clock is clock
 
 
 def test_the_table_and_the_seeker_with_20_ms_between_their_clocks():

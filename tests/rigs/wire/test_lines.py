@@ -13,6 +13,7 @@ from hmpim.identify import identify
 from hmpim.rigs import SystemClock
 from hmpim.rigs.catalogue import describe, find_rig
 from hmpim.rigs.wire import CanServer, FarEnd, SerialServer, UdpClient, UdpServer, WireRig, serve
+from hmpim.rigs.wire.serial import SerialClient
 from hmpim.stimulus import Limits, design
 from tests_support import meanwhile
 from wire_support import Lag, hello
@@ -95,6 +96,20 @@ def test_what_is_not_there_is_said():
             ).rig,
             SWEEP,
         )
+
+
+def test_a_serial_port_is_for_one_run_at_a_time():
+    pytest.importorskip("serial")
+    master, end = os.openpty()
+    line = SerialClient(os.ttyname(end))
+    try:
+        line.open()
+        with pytest.raises(RigError, match=r"cannot be opened: .*exclusively lock"):
+            SerialClient(os.ttyname(end)).open()
+    finally:
+        line.close()
+        os.close(master)
+        os.close(end)
 
 
 @pytest.mark.parametrize(

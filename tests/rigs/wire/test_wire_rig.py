@@ -146,6 +146,7 @@ def test_limits_and_axes_come_with_the_hello():
     ("expected", "words"),
     [
         (Hello(rate=1000.0), "refuses: 'bench' runs at 500 Hz, and 1000 Hz is expected"),
+        (Hello(watchdog=0.02), "brakes after 0.08 s of silence, and a watchdog of 0.02 s is exp"),
         (Hello(axes=("nod",)), "'bench' has no axis 'nod', which is expected; it has roll, yaw"),
         (Hello(axes=("roll",), units=("rad",)), "says that roll is in 'deg', and 'rad' is expec"),
         (
@@ -202,6 +203,58 @@ def test_a_stimulus_at_another_rate_is_refused_before_anything_moves():
     with pytest.raises(RigError, match="runs at 500 Hz, and 250 Hz is expected; design the stim"):
         run(WireRig(transport=network, clock=clock), slow, options=RunOptions(clock=clock))
     assert State.ARMED not in network.states
+
+
+def test_a_heavy_axis_is_waited_for_while_it_says_that_it_brakes():
+    """From 150 deg/s with 45 deg/s² it takes more than 3 s."""
+    heavy = Limits(position=900.0, velocity=200.0, acceleration=45.0, unit="deg")
+    far = FarEnd(replace(hello(axes=("roll",)), limits={"roll": heavy}))
+    slow = design(
+        band=(0.03, 0.06), duration=40, fs=500, axis="roll", extinction=0.0,
+        limits=Limits(velocity=150, acceleration=44, unit="deg"),
+    )  # fmt: skip
+    clock = ManualClock()
+    network = Network(clock, far)
+    fast = float(slow.time[np.argmax(np.abs(slow.velocity))])
+
+    def end(played):
+        if played.block.time[-1] > fast:
+            raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        run(
+            WireRig(transport=network, clock=clock),
+            slow,
+            subscribers=[end],
+            options=RunOptions(clock=clock),
+        )
+    assert network.farend.state in (State.AT_REST, State.IDLE)
+    assert not network.orders[-1].velocity.any()
+
+
+class Unplugged(Network):
+    """A line whose port is gone after a while: sending and receiving fail."""
+
+    sent = closed = 0
+
+    def send(self, data):
+        self.sent += 1
+        if self.sent > 500:
+            raise RigError("serial:x is gone: device disconnected")
+        super().send(data)
+
+    def close(self):
+        self.closed += 1
+
+
+def test_a_port_that_is_gone_is_closed_and_the_cause_is_said():
+    clock, log = ManualClock(), RunLog()
+    line = Unplugged(clock)
+    said = "serial:x is gone: device disconnected; then it could not be told to stop$"
+    with pytest.raises(RigError, match=said):
+        run(WireRig(transport=line, clock=clock), SWEEP, log=log, options=RunOptions(clock=clock))
+    assert line.closed == 1
+    assert "disconnecting failed: serial:x is gone" in log.text()
 
 
 def test_nobody_answers():

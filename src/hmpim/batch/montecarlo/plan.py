@@ -50,6 +50,8 @@ _ABOVE_ZERO = (
     *("natural_frequency", "frequency_of_band", "damping_ratio"),
 )
 _FROM_ZERO = ("extinction", "delay", "std", "std_of_amplitude")
+_LARGEST = 1e70
+"""Size beyond which, as below its inverse, products overflow in the identification."""
 _NOT_ZERO = ("amplitude", "scale_factor", "sign")
 
 Value = float | str | None
@@ -134,11 +136,14 @@ def read_plan(path: Path) -> Plan:
         raise ArgumentError(f"{path.name}: seed = {seed!r}; give a whole number, 0 or more")
     if isinstance(draws, bool) or not isinstance(draws, int) or not 1 <= draws <= 10**8:
         raise ArgumentError(f"{path.name}: draws = {draws!r}; give a whole number from 1 on")
+    name = told.get("name", path.stem)
+    if not isinstance(name, str):
+        raise ArgumentError(f"{path.name}: name = {name!r}; give a text")
     regions = told.get("regions", [])
     if not isinstance(regions, list):
         raise ArgumentError(f"{path.name}: regions = {regions!r}; give a list of names")
     plan = Plan(
-        name=str(told.get("name", path.stem)),
+        name=name,
         seed=seed,
         draws=draws,
         quantities=quantities,
@@ -206,6 +211,8 @@ def _is_value(value: object, *, words: bool) -> bool:
 def _check_range(what: str, name: str, law: Any) -> None:
     """Refuse what no draw could be made of."""
     for value in _ends(law):
+        if value != 0 and not 1.0 / _LARGEST < abs(value) < _LARGEST:
+            raise ArgumentError(f"{what} = {value:g} is out of range; nothing could be computed")
         if name in _ABOVE_ZERO and not value > 0:
             raise ArgumentError(f"{what} = {value:g} is out of range; it must be more than 0")
         if name in _FROM_ZERO and not value >= 0:

@@ -1,5 +1,6 @@
 """One door for all targets: which file each becomes, and who writes it."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
@@ -18,6 +19,7 @@ from hmpim.formats.models.mat import write_mat
 from hmpim.formats.models.matlab import write_matlab
 from hmpim.formats.models.modelica import write_modelica
 from hmpim.formats.models.mujoco import write_mujoco
+from hmpim.formats.models.nonlinear import LinearPartOnly, with_nonlinear_part
 from hmpim.formats.models.python import write_python
 from hmpim.formats.models.source import Source, identifier, source_of
 from hmpim.formats.models.uff58 import write_uff58
@@ -137,7 +139,8 @@ def export(
 
     Every export carries the error bars, the units, and where it comes from: the digest of the
     record, the version of hmpim, the verdict and the warnings. Each file states what is exact in it
-    and what is not, and by how much.
+    and what is not, and by how much. A nonlinear part is carried where the target has a form for
+    it; elsewhere the file says what it lacks.
 
     Parameters
     ----------
@@ -174,6 +177,12 @@ def export(
         If the target is not known, a pair must be chosen, or the target cannot hold the model.
     RecordError
         If the record does not determine a figure that the model needs.
+
+    Warns
+    -----
+    LinearPartOnly
+        If a nonlinearity was found that the target has no form for, or that is not part of the
+        model. The file says so too.
 
     Examples
     --------
@@ -223,7 +232,11 @@ def export(
     _check_kind(to, source)
     if to == "matlab":
         _check_name(place, source.name)
-    return writer.write(source, place, choices)
+    source, lacking = with_nonlinear_part(source, to)
+    written = writer.write(source, place, choices)
+    if lacking is not None:
+        warnings.warn(f"{place.name}: {lacking}", LinearPartOnly, stacklevel=2)
+    return written
 
 
 def _check_kind(to: str, source: Source) -> None:

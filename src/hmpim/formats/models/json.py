@@ -34,6 +34,7 @@ def json_document(source: Source) -> dict[str, Any]:
         "saturation": [model.saturation_low, model.saturation_high],
         "hold_period": model.hold_period,
         "quantization_step": model.quantization_step,
+        "nonlinear": None if model.nonlinear is None else model.nonlinear.to_dict(),
         "intersample": model.intersample,
         "fs": model.fs,
         "band": model.band,

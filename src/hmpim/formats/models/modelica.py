@@ -10,6 +10,7 @@ from hmpim.formats.atomic import write_text
 from hmpim.formats.models.refined import modal_matrices
 from hmpim.formats.models.render import c_number, rendered
 from hmpim.formats.models.source import Source
+from hmpim.model import Model
 
 __all__ = ["write_modelica"]
 
@@ -36,6 +37,8 @@ def write_modelica(source: Source, path: Path) -> tuple[Path, ...]:
         delay=model.delay,
         derivatives=derivatives,
         shown=shown,
+        entered=_entered(model),
+        bent=_bent(model),
         model=model,
         estimates=[
             (name, estimate) for name, estimate in source.estimates() if np.isfinite(estimate.value)
@@ -44,6 +47,25 @@ def write_modelica(source: Source, path: Path) -> tuple[Path, ...]:
     )
     write_text(path, text)
     return (path,)
+
+
+def _entered(model: Model) -> str:
+    """The input of the dynamics: late, and beyond a dead zone."""
+    late = "delay(u, tau)" if model.delay > 0 else "u"
+    part = model.nonlinear
+    if part is None or part.kind != "dead_zone":
+        return late
+    half = c_number(part.size)
+    return f"{late} - max(-{half}, min({half}, {late}))"
+
+
+def _bent(model: Model) -> str:
+    """The output by a scale that changes with the deflection; empty if it does not."""
+    part = model.nonlinear
+    if part is None or part.at != "output":
+        return ""
+    weight, reach = c_number(part.weight * part.reach), c_number(part.reach)
+    return f"linear + ({weight}) * (linear / {reach})^{part.power}"
 
 
 def _chain(below: Real, above: Real) -> tuple[list[str], str]:

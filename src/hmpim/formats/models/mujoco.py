@@ -17,7 +17,7 @@ from hmpim.formats.atomic import write_text
 from hmpim.formats.models.ranges import ranges_of
 from hmpim.formats.models.render import rendered
 from hmpim.formats.models.source import Source
-from hmpim.model import frequency_response
+from hmpim.model import Model, frequency_response
 
 __all__ = ["Stepped", "stepped_response", "write_mujoco"]
 
@@ -78,9 +78,18 @@ def write_mujoco(source: Source, path: Path, *, timestep: float | None) -> tuple
         band=band,
         model=source.causal(),
         ranges=ranges_of(source),
+        friction=_friction(model, stepped),
     )
     write_text(path, text)
     return (path,)
+
+
+def _friction(model: Model, stepped: Stepped) -> tuple[float, float] | None:
+    """Friction of the body, and the rate at which its constraint stops it: within a step."""
+    part = model.nonlinear
+    if part is None or stepped.stiffness is None:
+        return None
+    return part.size * stepped.stiffness, 1.0 / stepped.timestep
 
 
 def _stepped(source: Source, timestep: float | None) -> Stepped:

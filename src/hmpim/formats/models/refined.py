@@ -96,6 +96,7 @@ def refined_values(source: Source) -> dict[str, Any]:
         "real": seen.response.real,
         "imag": seen.response.imag,
         "std": seen.std,
+        "bent": model.nonlinear,
     }
 
 

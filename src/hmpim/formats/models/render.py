@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable
+from math import floor
 from pprint import pformat
 from typing import Any
 
@@ -9,8 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hmpim.model import Chain
+from hmpim.model.fine import FINE
+from hmpim.model.nonlinear import force_step
+from hmpim.model.operators import command_step
+from hmpim.model.stepped import SteppedPart
 
 __all__ = ["c_number", "chain_context", "literal", "rendered"]
+
+_OPERATORS = ("backlash", "dead_zone", "rate_limit", "friction")
+"""Kinds that are no power of the deflection."""
 
 
 def c_number(value: float) -> str:
@@ -111,4 +119,35 @@ def chain_context(chain: Chain) -> dict[str, Any]:
         "error": chain.error,
         "band": step.band,
         "gain": step.gain,
+        "bent": None if chain.nonlinear is None else _bent_context(chain.nonlinear),
     }
+
+
+def _bent_context(stepped: SteppedPart) -> dict[str, Any]:
+    """Lay out a nonlinear part for the templates of programs."""
+    part = stepped.part
+    context: dict[str, Any] = {
+        "kind": part.kind,
+        "form": part.kind if part.kind in _OPERATORS else part.at,
+        "size": part.size,
+        "step": part.size / stepped.fs,
+        "fine": FINE,
+    }
+    if part.kind not in _OPERATORS:
+        context |= {"weight": part.weight, "power": part.power, "reach": part.reach}
+    if context["form"] == "force":
+        transition, first, last = force_step(stepped.denominator)
+        context |= {"transition": transition, "first": first, "last": last}
+    if part.kind == "friction":
+        late = stepped.system.delay * stepped.fs * FINE
+        whole = floor(late)
+        context |= {
+            "motion": command_step(stepped.denominator),
+            "inertia": float(stepped.denominator[2]),
+            "gain": float(stepped.system.numerator[0]),
+            "whole": whole,
+            "part": late - whole,
+            "held": part.between == "zoh",
+            "commands": max((whole + FINE + 1) // FINE + 2, 3),
+        }
+    return context

@@ -18,7 +18,10 @@ from hmpim.identify import (
 from hmpim.model import Chain, Model
 from hmpim.record import Intersample
 
-__all__ = ["Source", "identifier", "source_of"]
+__all__ = ["LINEAR_PART", "Source", "ascii_of", "identifier", "source_of"]
+
+LINEAR_PART = "The file holds the linear part alone: "
+"""How the note of an export begins that lacks a nonlinearity."""
 
 _NEGLIGIBLE = 3.0
 """Standard deviations up to which a negative delay counts as none."""
@@ -44,6 +47,8 @@ class Source:
         Rate in Hz at which stepped targets run.
     intersample : {'zoh', 'foh', 'bandlimited'}
         What the input does between its samples.
+    note : str
+        What the target has of a nonlinearity; empty of a linear unit.
     """
 
     name: str
@@ -53,6 +58,7 @@ class Source:
     version: str
     fs: float
     intersample: Intersample
+    note: str = ""
 
     def estimates(self) -> Iterator[tuple[str, Estimate]]:
         """Yield every parameter that the record tells, with its name."""
@@ -76,7 +82,8 @@ class Source:
         ]
         said += [f"  {name}: {_words(estimate)}" for name, estimate in self.estimates()]
         said += [f"Warning ({w.code}): {w.message}" for w in pair.warnings]
-        return [_ascii(line) for line in said]
+        said += [self.note] if self.note else []
+        return [ascii_of(line) for line in said]
 
     @property
     def moved_before(self) -> bool:
@@ -223,7 +230,7 @@ def _words(estimate: Estimate) -> str:
     return said if estimate.verdict == "ok" else f"{said} (doubtful)"
 
 
-def _ascii(line: str) -> str:
+def ascii_of(line: str) -> str:
     """Keep what every compiler reads: comments of other characters differ between them."""
     for sign, plain in (("→", "->"), ("±", "+-"), ("²", "^2"), ("³", "^3"), ("°", "deg")):
         line = line.replace(sign, plain)

@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.errors import MissingExtraError
 from hmpim.formats.atomic import replacing
 from hmpim.formats.models.response import response_of
-from hmpim.formats.models.source import Source
+from hmpim.formats.models.source import LINEAR_PART, Source, ascii_of
 
 __all__ = ["write_uff58"]
 
@@ -32,6 +32,7 @@ def write_uff58(source: Source, path: Path) -> tuple[Path, ...]:
             "UFF58 needs the package pyuff; install it with: pip install 'hmpim[uff]'"
         ) from None
     seen, pair = response_of(source), source.pair
+    lacking = ascii_of(source.note).removeprefix(LINEAR_PART) or "NONE"
     said = [
         f"{pair.output} from {pair.input}",
         f"hmpim {source.version}, verdict {pair.verdict}",
@@ -51,7 +52,7 @@ def write_uff58(source: Source, path: Path) -> tuple[Path, ...]:
                     func_type=function,
                     id1=said[0][:_LINE],
                     id2=kind[:_LINE],
-                    id3="NONE",
+                    id3=lacking[:_LINE],
                     id4=said[1][:_LINE],
                     id5=said[2][:_LINE],
                     rsp_ent_name=pair.output[:10],

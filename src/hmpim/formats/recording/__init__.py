@@ -3,7 +3,7 @@
 from hmpim.formats.recording.heading import FORMAT, Heading
 from hmpim.formats.recording.opened import Opened, Track, open_recording
 from hmpim.formats.recording.recording import Recording, read_recording, save_recording
-from hmpim.formats.recording.writer import RecordWriter
+from hmpim.formats.recording.writer import RecordWriter, check_free
 
 __all__ = [
     "FORMAT",
@@ -12,6 +12,7 @@ __all__ = [
     "RecordWriter",
     "Recording",
     "Track",
+    "check_free",
     "open_recording",
     "read_recording",
     "save_recording",

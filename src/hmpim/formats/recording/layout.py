@@ -12,7 +12,8 @@ crash or hang.
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,8 @@ GROUPS: dict[Role, str] = {
 
 LOG_WIDTH = 240
 """Bytes of a line of the log; a longer one is cut."""
+
+_ERRNO = re.compile(r"errno = (\d+)")
 
 COLUMNS = "first sample, number of samples, CRC-32 of their times, CRC-32 of their values"
 
@@ -107,16 +110,33 @@ def log_line(text: str) -> bytes:
     return " ".join(text.split()).encode()[:LOG_WIDTH].decode(errors="ignore").encode()
 
 
-def new_file(path: Path) -> Any:
-    """Open a new file (h5py.File) at `path`, of the kind that ours are."""
+@contextmanager
+def new_file(path: Path) -> Iterator[Any]:
+    """Open a new file (h5py.File) at `path`, of the kind that ours are.
+
+    Raises
+    ------
+    OSError
+        If the system takes no more of it; h5py may say that as another error.
+    """
     import h5py
 
-    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
-    access.set_libver_bounds(h5py.h5f.LIBVER_V18, h5py.h5f.LIBVER_V18)
-    plan = h5py.h5p.create(h5py.h5p.FILE_CREATE)
-    plan.set_attr_phase_change(64, 48)  # attributes of the root stay in one place at the start
-    truncate = h5py.h5f.ACC_TRUNC
-    return h5py.File(h5py.h5f.create(os.fsencode(path), truncate, fcpl=plan, fapl=access))
+    try:
+        access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+        access.set_libver_bounds(h5py.h5f.LIBVER_V18, h5py.h5f.LIBVER_V18)
+        plan = h5py.h5p.create(h5py.h5p.FILE_CREATE)
+        plan.set_attr_phase_change(64, 48)  # attributes of the root stay in place at the start
+        truncate = h5py.h5f.ACC_TRUNC
+        with h5py.File(
+            h5py.h5f.create(os.fsencode(path), truncate, fcpl=plan, fapl=access)
+        ) as file:
+            yield file
+    except (OSError, RuntimeError, ValueError) as error:
+        found = _ERRNO.search(str(error))
+        if found is None:
+            raise
+        number = int(found[1])
+        raise OSError(number, os.strerror(number)) from error
 
 
 def lay_out(

@@ -10,6 +10,7 @@ needed, and any program can open the file meanwhile.
 import contextlib
 import os
 import secrets
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +37,7 @@ from hmpim.rigs import ChannelSpec, Layout, Samples
 from hmpim.rigs.protocol import LimitsOfAxes
 from hmpim.stimulus import Stimulus
 
-__all__ = ["RecordWriter"]
+__all__ = ["RecordWriter", "check_free"]
 
 _LOG_LINES = 500
 _MARGIN = 1.1  # a unit with a clock of its own may send somewhat more than was expected
@@ -88,7 +89,7 @@ class RecordWriter:
     Raises
     ------
     ArgumentError
-        If the file cannot be written there, or the disk has no room for it.
+        If the file cannot be written there, another process writes it, or the disk has no room.
 
     Examples
     --------
@@ -137,6 +138,7 @@ class RecordWriter:
         # Twice: closed, it is written anew in its final length beside the one that grew.
         check_writable(self._path, size=2 * 16 * room * len(self._channels) + 1_000_000)
         self._target = self._path.resolve()
+        check_free(self._target)
         self._draft: Path | None = self._beside()
         self._file, self._places, self._log_at = self._laid_out(
             self._draft, [room] * len(self._channels)
@@ -171,6 +173,7 @@ class RecordWriter:
             )
         try:
             if self._draft is not None and any(part.time.size for part in samples.values()):
+                check_free(self._target)
                 os.replace(self._draft, self._target)
                 self._draft = None
             for name, part in samples.items():
@@ -274,10 +277,11 @@ class RecordWriter:
                     )
                     for space, room in zip(spaces, made, strict=True)
                 }
-            return path.open("r+b", buffering=0), places, log_at
+            return _held(path.open("r+b", buffering=0)), places, log_at
         except OSError as error:
             path.unlink(missing_ok=True)
-            raise ArgumentError(f"{str(self._path)!r} cannot be written: {error}") from error
+            reason = error.strerror or error
+            raise ArgumentError(f"{str(self._path)!r} cannot be written: {reason}") from error
 
     def _write(self, name: str, time: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         place = self._places[name]
@@ -312,6 +316,40 @@ class RecordWriter:
         os.replace(draft, self._target)
         self._file.close()
         self._file, self._places, self._log_at = file, places, log_at
+
+
+def _held(file: BinaryIO) -> BinaryIO:
+    """Hold a file that grows, as a reader holds it: who would write it as well is refused."""
+    if sys.platform != "win32":  # which does not replace a file that is open
+        import fcntl
+
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    return file
+
+
+def check_free(path: Path) -> None:
+    """Refuse to replace a file that another run writes: its samples would go nowhere.
+
+    Raises
+    ------
+    ArgumentError
+        If another process, or this one, has it open.
+    """
+    if sys.platform == "win32" or not path.is_file():
+        return
+    import fcntl
+
+    with contextlib.suppress(FileNotFoundError, PermissionError), path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ArgumentError(
+                f"{str(path)!r} is being written by another run, or open in another program; name "
+                "another file"
+            ) from None
+        except OSError:  # a file system without locks
+            return
 
 
 def _space(spec: ChannelSpec, room: int, block: int) -> Space:

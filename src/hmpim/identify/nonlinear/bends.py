@@ -30,10 +30,10 @@ from hmpim.identify.nonlinear.mechanisms import (
     Hypothesis,
     Kind,
     hypotheses,
-    rate_limited,
     stretch_of,
 )
 from hmpim.identify.worth import MATERIAL, PART, WORTH
+from hmpim.model.operators import rate_limited
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample

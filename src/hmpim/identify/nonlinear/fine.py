@@ -1,6 +1,4 @@
-"""Signals on a clock finer than the samples: what is not linear happens between them too."""
-
-from functools import cache
+"""The linear part of a fit, at the samples and on the finer clock of `hmpim.model.fine`."""
 
 import numpy as np
 import scipy
@@ -8,42 +6,9 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
-from hmpim.record import Intersample
+from hmpim.model.fine import FINE
 
-__all__ = ["FINE", "finely", "linear_part", "linear_part_finely", "sampled"]
-
-FINE = 8
-"""Steps of the finer clock to a sample."""
-
-
-def finely(u: Real, mode: Intersample) -> Real:
-    """An input, (n,), on the finer clock from its first sample to its last.
-
-    Examples
-    --------
-    >>> finely(np.array([0.0, 1.0, 1.0, 0.0]), "foh")[:10].tolist()
-    [0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.0]
-    """
-    source = prepare_input(u, mode)
-    still = np.ones(1)
-    steps = [delayed_response(source, delay=-k / FINE, denominator=still)[0] for k in range(FINE)]
-    return np.asarray(source.first + np.stack(steps, axis=1).ravel()[: 1 - FINE])
-
-
-def sampled(fine: Real) -> Real:
-    """The part of a signal on the finer clock below half the sampling rate, at the samples."""
-    reach = min(MARGIN * FINE, fine.size - 1)
-    longer = np.pad(fine, reach, mode="reflect", reflect_type="odd")
-    smooth = scipy.signal.oaconvolve(longer, _below_half_the_rate(), mode="same")
-    return np.asarray(smooth[reach : reach + fine.size : FINE])
-
-
-@cache
-def _below_half_the_rate() -> Real:
-    """Windowed sinc on the finer clock that keeps what the samples determine."""
-    size = 2 * MARGIN * FINE + 1
-    return np.asarray(scipy.signal.firwin(size, 1.0 / FINE, window=("kaiser", 12.0)))
+__all__ = ["linear_part", "linear_part_finely"]
 
 
 def linear_part(problem: Problem, fit: Fit) -> Real:

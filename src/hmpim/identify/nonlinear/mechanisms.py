@@ -25,19 +25,17 @@ reduce its estimated size.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.nonlinear.harmonic_regression import HarmonicFit
-from hmpim.model.poles import rational_response
-from hmpim.model.sampled import prepare_input
+from hmpim.model.nonlinear import KIND_WORDS, Kind
+from hmpim.model.operators import play, pushed, rate_limited, reversals
 
 __all__ = [
     "GAPS",
@@ -51,35 +49,8 @@ __all__ = [
     "compare_harmonics",
     "compare_mechanisms",
     "hypotheses",
-    "play",
-    "rate_limited",
     "stretch_of",
-    "through",
 ]
-
-Kind = Literal[
-    "hardening",
-    "softening",
-    "friction",
-    "backlash",
-    "rate_limit",
-    "saturation",
-    "asymmetry",
-    "curvature",
-    "dead_zone",
-]
-
-KIND_WORDS: dict[Kind, str] = {
-    "hardening": "a hardening spring",
-    "softening": "a softening spring",
-    "friction": "Coulomb friction",
-    "backlash": "backlash",
-    "rate_limit": "a rate limit",
-    "saturation": "clipping",
-    "asymmetry": "an asymmetric response",
-    "dead_zone": "a dead zone of the command",
-    "curvature": "a scale factor that changes with the deflection",
-}
 
 GAPS = (0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4)
 """Half gaps to try, over the output's largest deviation."""
@@ -123,60 +94,6 @@ class Mechanism:
     rms: float  # of the part that no linear change explains, in the output's unit
     effect: float  # r.m.s. of the whole effect, in the output's unit
     trace: Real  # (n,): effect in the output, up to a factor, over the samples analysed
-
-
-def _reversals(x: Real) -> NDArray[np.intp]:
-    """Reversals of a signal, and its end: only there must the output of backlash be computed."""
-    way = np.sign(np.diff(x))
-    return np.asarray(np.append(np.flatnonzero(way[1:] * way[:-1] <= 0.0) + 1, x.size - 1))
-
-
-def play(x: Real, half_gap: float, reversals: NDArray[np.intp] | None = None) -> Real:
-    """Output of backlash: it follows `x`, (n,), half a gap behind, and waits at each reversal.
-
-    Examples
-    --------
-    >>> play(np.array([0.0, 1.0, 2.0, 1.5, 0.0]), 0.5).tolist()
-    [0.0, 0.5, 1.5, 1.5, 0.5]
-    """
-    turns = _reversals(x) if reversals is None else reversals
-    before, now = [], float(x[0])
-    for turn in x[turns].tolist():
-        before.append(now)
-        now = min(max(now, turn - half_gap), turn + half_gap)
-    held = np.repeat(before, np.diff(turns, prepend=-1))
-    return np.asarray(np.clip(held, x - half_gap, x + half_gap))
-
-
-def rate_limited(x: Real, step: float) -> Real:
-    """Follow `x`, moving by no more than `step` from sample to sample.
-
-    Examples
-    --------
-    >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
-    [0.0, 1.0, 2.0, 3.0]
-    """
-    target, reached = x.tolist(), 0
-    out, late = x.copy(), target.copy()
-    fast = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
-    for lost in fast:
-        if lost < reached:
-            continue  # already behind
-        now = target[lost]
-        for reached in range(lost + 1, len(target)):  # until it has caught up
-            ahead = target[reached] - now
-            if ahead > step:
-                now += step
-            elif ahead < -step:
-                now -= step
-            else:
-                break
-            late[reached] = now
-        else:
-            break
-    for begin in fast[:1]:
-        out[begin : reached + 1] = late[begin : reached + 1]
-    return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -293,14 +210,6 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
-def through(forces: Real, denominator: Real) -> Real:
-    """Responses of dynamics without delay to forces, (k, n), given in the output's unit."""
-    first = forces[:, :1]
-    source = prepare_input(forces - first, "foh")
-    answer = rational_response(source, delay=0.0, numerator=np.ones(1), denominator=denominator)
-    return np.asarray(answer + first)
-
-
 def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
     """Every kind with every value to try.
 
@@ -321,16 +230,16 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     yield Hypothesis(kind="asymmetry", trace=-square)
     if denominator[0] > 0 and denominator.size > 1:  # an integrator has no restoring force
         direction = np.tanh(step / (_STICKS * fastest))
-        cubic, quadratic, friction = through(np.stack((cube, square, direction)), denominator)
+        cubic, quadratic, friction = pushed(np.stack((cube, square, direction)), denominator)
         yield Hypothesis(kind="hardening", trace=-cubic)
         yield Hypothesis(kind="softening", trace=cubic)
         yield Hypothesis(kind="asymmetry", trace=-quadratic)
         yield Hypothesis(kind="asymmetry", trace=quadratic)
         yield Hypothesis(kind="friction", trace=-friction)
-    reversals = _reversals(x)
+    turns = reversals(x)
     for gap in GAPS[every // 2 :: every]:
         half = gap * largest
-        trace = (play(x, half, reversals) - x) / half
+        trace = (play(x, half, turns) - x) / half
         yield Hypothesis(kind="backlash", trace=trace, spacing=0.15 * half)
     for level in _LEVELS[every // 2 :: every]:
         size, spacing = level * largest, 0.05 * largest

@@ -33,7 +33,8 @@ from hmpim.identify.result import Estimate
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.worth import MATERIAL, PART
-from hmpim.record import Finding
+from hmpim.model.nonlinear import NonlinearPart
+from hmpim.record import Finding, Intersample
 
 __all__ = [
     "Modelled",
@@ -61,6 +62,7 @@ class Modelled:
     std: float  # standard deviation of the size
     trend: Real  # (n,): its effect on the output
     waits: Mask | None  # (n,): samples that do not depend on the linear part
+    part: NonlinearPart  # what a model needs of it
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
@@ -170,8 +172,10 @@ def leaves_noise(joint: JointFit, one: Nonlinearity) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(joint: JointFit, one: Nonlinearity) -> tuple[Modelled, Real]:
+def described(joint: JointFit, one: Nonlinearity, between: Intersample) -> tuple[Modelled, Real]:
     """The nonlinearity as the fit with its row, the last of its rows, has it.
+
+    `between` is what the row took the command to do between its samples.
 
     The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
     its derivatives are instruments, and those of the model include how the row moves (Söderström
@@ -198,7 +202,8 @@ def described(joint: JointFit, one: Nonlinearity) -> tuple[Modelled, Real]:
     if waits is not None:
         waits[: max(one.begins, joint.forgotten)] = False
     std = float(np.sqrt(own[-1, -1]))
-    found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits)
+    part = NonlinearPart(kind=kind, at=one.at, size=size, std=std, reach=one.reach, between=between)
+    found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits, part=part)
     return found, np.asarray(own[:-1, :-1])
 
 

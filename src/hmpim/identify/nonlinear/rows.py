@@ -19,16 +19,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.nonlinear.fine import FINE, finely, linear_part, linear_part_finely, sampled
-from hmpim.identify.nonlinear.mechanisms import GAPS, Kind, play, through
+from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
+from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
 from hmpim.identify.worth import MATERIAL, PART
+from hmpim.model.fine import FINE, finely, sampled
+from hmpim.model.nonlinear import Place
+from hmpim.model.operators import gap_crossed, play, power_of, pushed, rubbed
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -56,6 +58,8 @@ class Nonlinearity:
     counts: Mask | None = None  # (n,): samples that depend on the linear part; None if all do
     size: float = 0.0  # for which the row was made
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
+    at: Place = "output"  # where it acts
+    reach: float = 0.0  # largest deflection that it was made for; of a dead zone, largest command
 
 
 def with_row(problem: Problem, one: Nonlinearity) -> Problem:
@@ -70,12 +74,15 @@ def first_rows(
     kind: Kind, command: Command, problem: Problem, start: Fit
 ) -> Iterator[Nonlinearity]:
     """Rows of a kind as the linear fit suggests them."""
-    sizes = [gap * float(np.max(np.abs(linear_part(problem, start)))) for gap in GAPS]
     if kind == "backlash":
-        yield _likeliest([_waiting(problem, start, size) for size in sizes], problem, start)
+        largest = float(np.max(np.abs(linear_part(problem, start))))
+        tried = [_waiting(problem, start, gap * largest) for gap in GAPS]
+        yield _likeliest(tried, problem, start)
     elif kind == "friction" and start.structure.name == "second_order":
         fine = finely(command.u, command.intersample)
-        yield _likeliest([_rubbing(fine, problem, start, size) for size in sizes], problem, start)
+        largest = float(np.max(np.abs(linear_part(problem, start))))
+        tried = [_rubbing(fine, problem, start, gap * largest) for gap in GAPS]
+        yield _likeliest(tried, problem, start)
     elif kind in ("hardening", "softening"):
         yield _forced(kind, problem, start, power=3)
     elif kind == "curvature":
@@ -120,11 +127,12 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | 
 def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     """A dead zone of half a width, of an input on the finer clock."""
     row = -_through_model(sampled(np.clip(fine, -half, half)) / half, problem, fit)
+
+    def again(_: Problem, fit: Fit) -> Nonlinearity:
+        return _dead(fine, problem, fit, abs(float(fit.nuisance[-1])))
+
     return Nonlinearity(
-        kind="dead_zone",
-        row=row,
-        again=lambda _, fit: _dead(fine, problem, fit, _size_of(fit)),
-        size=half,
+        kind="dead_zone", row=row, again=again, size=half, at="command", reach=_most(fine)
     )
 
 
@@ -140,16 +148,20 @@ def _waiting(problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     fine = linear_part_finely(problem, fit)  # it turns between samples
     moved = ((play(fine, half) - fine) / half)[::FINE]
     counts = np.abs(np.abs(moved) - 1.0) < MATERIAL**2
-    reached = np.maximum.accumulate(fine) - np.minimum.accumulate(fine) >= 2.0 * half
-    begins = int(np.count_nonzero(~reached[::FINE]))
+    begins = int(np.count_nonzero(~gap_crossed(fine, half)[::FINE]))
     counts[:begins] = False
+
+    def again(data: Problem, fit: Fit) -> Nonlinearity:
+        return _waiting(data, fit, abs(float(fit.nuisance[-1])))
+
     return Nonlinearity(
         kind="backlash",
+        again=again,
         row=moved,
-        again=lambda data, fit: _waiting(data, fit, _size_of(fit)),
         counts=counts,
         size=half,
         begins=begins,
+        reach=_most(fine),
     )
 
 
@@ -158,58 +170,26 @@ def _rubbing(fine: Real, problem: Problem, fit: Fit, force: float) -> Nonlineari
 
     The unit is stepped in time, from rest, with friction and without.
     """
-    size = float(fit.linear[0])
-    at = np.arange(fine.size)
-    command = size * np.interp(at - FINE * fit.delay, at, fine, left=fine[0])
-    between = 0.5 * (command[:-1] + command[1:])
-    (_, damping, inertia), still = fit.denominator, command[0]
-    rates = np.array([[0.0, 1.0, 0.0], [-1.0, -damping, 1.0], [0.0, 0.0, 0.0]])
-    rates[1] /= inertia
-    step = scipy.linalg.expm(rates / FINE)[:2]
-    top, below = scipy.signal.ss2tf(step[:, :2], step[:, 2:], np.eye(1, 2), np.zeros((1, 1)))
-    free = scipy.signal.lfilter(top[0], below, np.append(between, command[-1]) - still) + still
-    rubbed, moves = _stick_slip(step, between, still, force, inertia)
-    return Nonlinearity(
-        kind="friction",
-        row=((rubbed - free) / force)[::FINE],
-        again=lambda _, fit: _rubbing(fine, problem, fit, _size_of(fit)),
-        counts=moves[::FINE],
-        size=force,
+    held, free, moves = rubbed(
+        fine,
+        delay=fit.delay,
+        denominator=fit.denominator,
+        gain=float(fit.linear[0]),
+        force=force,
     )
 
+    def again(_: Problem, fit: Fit) -> Nonlinearity:
+        return _rubbing(fine, problem, fit, abs(float(fit.nuisance[-1])))
 
-def _size_of(fit: Fit) -> float:
-    """Size of the nonlinearity, whose row is the last."""
-    return abs(float(fit.nuisance[-1]))
-
-
-def _stick_slip(
-    step: Real, between: Real, still: float, force: float, inertia: float
-) -> tuple[Real, Mask]:
-    """Output of a unit with friction, and whether it moves, from rest at `still`.
-
-    `step`, (2, 3), takes position, speed and the command of a step to the next position and speed.
-    In the step in which it turns, it is followed to its reversal and from there.
-    """
-    (p, q, r), (s, t, o) = step.tolist()
-    z, v = still, 0.0
-    positions, moving = [z], [False]
-    for command in between.tolist():
-        ahead = command - z if v == 0.0 else v
-        if v or abs(ahead) > force:
-            driven = command - (force if ahead > 0.0 else -force)
-            further, faster = p * z + q * v + r * driven, s * z + t * v + o * driven
-            if faster * v < 0.0:
-                until = v / (v - faster) / FINE
-                further = z + 0.5 * v * until
-                pull, rest, faster = command - further, 1.0 / FINE - until, 0.0
-                if abs(pull) > force:
-                    faster = (pull - (force if pull > 0.0 else -force)) / inertia * rest
-                    further += 0.5 * faster * rest
-            z, v = further, faster
-        positions.append(z)
-        moving.append(v != 0.0)
-    return np.array(positions), np.array(moving)
+    return Nonlinearity(
+        kind="friction",
+        row=((held - free) / force)[::FINE],
+        again=again,
+        counts=moves[::FINE],
+        size=force,
+        at="force",
+        reach=_most(free),
+    )
 
 
 def _forced(
@@ -222,24 +202,28 @@ def _forced(
     """
     z = linear_part_finely(data, fit)
     z = z if own is None else z + own
+    largest = _most(z)
     slower = fit.denominator * FINE ** np.arange(fit.denominator.size)
-    fine = -through(_power(z, power)[None], slower)[0]
+    fine = -pushed(power_of(z, power, largest), slower)
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _forced(kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
 
-    return Nonlinearity(kind=kind, row=np.asarray(fine[::FINE]), again=again)
+    return Nonlinearity(
+        kind=kind, row=np.asarray(fine[::FINE]), again=again, at="force", reach=largest
+    )
 
 
 def _scaled(kind: Kind, data: Problem, fit: Fit, *, power: int) -> Nonlinearity:
     """A scale that changes with the deflection."""
-    return Nonlinearity(
-        kind=kind,
-        row=_power(linear_part(data, fit), power),
-        again=lambda data, fit: _scaled(kind, data, fit, power=power),
-    )
+
+    def again(data: Problem, fit: Fit) -> Nonlinearity:
+        return _scaled(kind, data, fit, power=power)
+
+    x = linear_part(data, fit)
+    largest = _most(x)
+    return Nonlinearity(kind=kind, row=power_of(x, power, largest), again=again, reach=largest)
 
 
-def _power(x: Real, power: int) -> Real:
-    largest = float(np.max(np.abs(x)))
-    return np.asarray(largest * (x / largest) ** power)
+def _most(x: Real) -> float:
+    return float(np.max(np.abs(x)))

@@ -20,10 +20,12 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.fine import FINE, finely, sampled
-from hmpim.identify.nonlinear.mechanisms import LONGEST, LONGEST_AUTOREGRESSION, RATES, rate_limited
+from hmpim.identify.nonlinear.mechanisms import LONGEST, LONGEST_AUTOREGRESSION, RATES
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import PART, TWICE
+from hmpim.model.fine import FINE, finely, sampled
+from hmpim.model.nonlinear import NonlinearPart
+from hmpim.model.operators import rate_limited
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Finding, Intersample
 
@@ -43,6 +45,18 @@ class LimitedCommand:
     values: Real  # (n,): what the unit follows, at the samples
     recorded: Real  # (n,): the command
     slope: Real  # (n,): partial derivative of the output by the speed, up to a factor
+    between: Intersample  # what the command does between its samples
+
+    def part(self, fs: float) -> NonlinearPart:
+        """What a model needs of it, for samples at `fs` in Hz."""
+        return NonlinearPart(
+            kind="rate_limit",
+            at="command",
+            size=self.speed * fs,
+            std=self.std * fs,
+            reach=self.fastest * fs,
+            between=self.between,
+        )
 
 
 def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
@@ -132,6 +146,7 @@ class _Followed:
     """A command on the finer clock, and the data with a plain fit to them."""
 
     fine: Real
+    between: Intersample
     fastest: float  # greatest speed of the command, in the input's unit per fine step
     problem: Problem
     start: Fit
@@ -141,7 +156,7 @@ class _Followed:
         """Take the command from its first sample to its last."""
         fine = finely(u, mode)
         fastest = float(np.max(np.abs(np.diff(fine))))
-        return cls(fine=fine, fastest=fastest, problem=problem, start=start)
+        return cls(fine=fine, between=mode, fastest=fastest, problem=problem, start=start)
 
     def at(self, speed: float) -> Problem:
         """The data, with the command as it is followed at this speed."""
@@ -215,6 +230,7 @@ def _profiled(
         values=_followed(command.fine, share * fastest),
         recorded=u,
         slope=command.slope(share * fastest, fit),
+        between=command.between,
     )
     return limited, fit
 

@@ -13,6 +13,7 @@ from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
 from hmpim.identify.result.plain import Plain, by_fields, fields_in
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
@@ -77,7 +78,8 @@ class PairIdentification(ByValue, Plain):
     and `residual` (shape (n,), the output's unit) are on the record's own uniform clock `time`;
     they follow from the record, and are part neither of the JSON nor of equality. `from_response`
     holds bandwidths read off the measured response, for comparison with the model's.
-    `nonlinearity` is None where the output does not follow the input at all. `stopping` says that
+    `nonlinearity` is None where the output does not follow the input at all. `nonlinear_part` is
+    what the model includes of it, and None where the model is linear. `stopping` says that
     the run ended early because the result was certain.
     """
 
@@ -101,6 +103,7 @@ class PairIdentification(ByValue, Plain):
     nonlinearity: Nonlinearity | None = None
     covariance: Real | None = None
     stopping: Stopping | None = None
+    nonlinear_part: NonlinearPart | None = None
 
     def __repr__(self) -> str:
         known = dict(_known(self.parameters))

@@ -11,8 +11,9 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.result import Estimate, PairIdentification, fit_percent
 from hmpim.identify.result.groups import in_words
+from hmpim.identify.uses.nonlinear import applied, known_state
 from hmpim.model import Model, Spread, simulate, slowest_time_constant
-from hmpim.record import Record, uniform
+from hmpim.record import Finding, Record, uniform
 
 __all__ = [
     "Prediction",
@@ -40,6 +41,10 @@ class Prediction:
         Samples that `fit_percent` is computed from.
     fit_percent : float
         100 (1 - ‖measured - predicted‖ / ‖measured - mean‖) over the scored samples.
+    findings : tuple of Finding
+        What to know about it: that the input goes beyond the amplitude at which a nonlinearity was
+        identified (`beyond_reach`), or that the prediction is that of the linear part alone
+        (`linear_only`).
     """
 
     time: Real
@@ -47,6 +52,7 @@ class Prediction:
     predicted: Real
     scored: Mask
     fit_percent: float
+    findings: tuple[Finding, ...] = ()
 
 
 def has_model(pair: PairIdentification) -> bool:
@@ -95,6 +101,7 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         fs=rate_of(pair) if fs is None else fs,
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
+        nonlinear=pair.nonlinear_part,
     )
 
 
@@ -150,6 +157,9 @@ def _spread(pair: PairIdentification) -> Spread | None:
 def predict(pair: PairIdentification, record: Record, *, start: float | None = None) -> Prediction:
     """Simulate the identified model on a record and score it.
 
+    The model is the linear part, the nonlinear part where the result has one, and the range of the
+    output.
+
     Parameters
     ----------
     pair : PairIdentification
@@ -166,12 +176,13 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
         If a channel is missing, or no samples remain to score.
     """
     aligned = uniform(record)
-    model = to_model(pair, fs=aligned.fs)
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
+    model, findings = applied(pair, to_model(pair, fs=aligned.fs), u.values, aligned.fs)
     predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
+    predicted = model.within(predicted)
     if start is None:
         start = aligned.start + settling_time(model)
-    scored = y.valid & (aligned.time >= start)
+    scored = y.valid & (aligned.time >= start) & known_state(model, u.values, aligned.fs)
     if np.count_nonzero(scored) < 2:
         raise RecordError(
             f"no samples are left to score from {start:.4g} s on; give a longer record"
@@ -183,4 +194,5 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
         predicted=predicted,
         scored=scored,
         fit_percent=fit_percent_of(measured, measured - predicted[scored]),
+        findings=findings,
     )

@@ -18,11 +18,12 @@ from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.uses.nonlinear import all_applied
 from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
 from hmpim.model.dynamics import FILTERS, STRUCTURES
-from hmpim.record import Aligned, Record, uniform
+from hmpim.record import Aligned, Finding, Record, uniform
 
 __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
 
@@ -148,6 +149,8 @@ class OutputValidation:
         Samples that count.
     checks : tuple of Check
         The checks.
+    findings : tuple of Finding
+        As in `Prediction`.
     """
 
     output: str
@@ -158,6 +161,7 @@ class OutputValidation:
     std: Real
     scored: Mask
     checks: tuple[Check, ...]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -193,6 +197,7 @@ class Validation:
                     "inputs": list(output.inputs),
                     "passed": output.passed,
                     "checks": [{**plain(check), "passed": check.passed} for check in output.checks],
+                    "findings": [plain(finding) for finding in output.findings],
                 }
                 for output in self.outputs
             ],
@@ -286,11 +291,9 @@ def _validated(
 ) -> OutputValidation:
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
-    models = [to_model(pair, fs=fs) for pair in pairs]
+    models, known, findings = all_applied(pairs, [to_model(pair, fs=fs) for pair in pairs], aligned)
     wait = max(settling_time(model) for model in models)
-    scored = y.valid & (aligned.time >= aligned.start + wait)
-    for pair in pairs:
-        scored &= aligned.signal(pair.input).valid
+    scored = y.valid & known & (aligned.time >= aligned.start + wait)
     if models[0].hold_period is not None:
         held = detect_hold(y.values, aligned.fs)  # the phase of its clock is the record's own
         if held is not None:
@@ -321,7 +324,7 @@ def _validated(
         inputs=tuple(pair.input for pair in pairs),
         time=aligned.time,
         measured=y.values,
-        predicted=predicted,
+        predicted=models[0].within(predicted),
         std=std,
         scored=scored,
         checks=(
@@ -335,6 +338,7 @@ def _validated(
             *_size(residual[scored], noise, model_std[scored], std[scored], bounds, unit=y.unit),
             *_tests(aligned, pairs, models, residual, scored, model_std, bounds),
         ),
+        findings=findings,
     )
 
 
@@ -361,10 +365,21 @@ def _model_std(
     """Standard deviation of the prediction, by the uncertainty of the models."""
     if any(model.spread is None for model in models):
         return np.zeros(aligned.samples)
-    free = [replace(model, hold_period=None) for model in models]
+    # A force is followed step by step: its own error is added to that of the linear part.
+    forced = [m.nonlinear is not None and m.nonlinear.at == "force" for m in models]
+    free = [
+        replace(model, hold_period=None, nonlinear=None if force else model.nonlinear)
+        for model, force in zip(models, forced, strict=True)
+    ]
     drawn = [draw_models(model, _DRAWS, rng=0) for model in free]
     predictions = [_predicted(some, pairs, aligned) for some in zip(*drawn, strict=True)]
-    return np.asarray(np.std(predictions, axis=0))
+    std = np.asarray(np.std(predictions, axis=0))
+    for model, one, pair in zip(models, free, pairs, strict=True):
+        part = model.nonlinear
+        if part is not None and one.nonlinear is None:
+            effect = _predicted([model], [pair], aligned) - _predicted([one], [pair], aligned)
+            std = np.hypot(std, np.abs(effect) * part.std / part.size)
+    return std
 
 
 def _size(

@@ -24,7 +24,7 @@ def build_udp(argument: str, description: Description) -> WireRig:
     'udp://127.0.0.1:5005'
     """
     host, port = parse_address(argument)
-    options = take_options(description, _TIMES, kind="UDP rig", loaded=True)
+    options = take_options(description, _TIMES, kind="UDP rig")
     return _over(UdpClient(host, port), options, description, kind="UDP rig")
 
 
@@ -38,7 +38,7 @@ def build_serial(argument: str, description: Description) -> WireRig:
     'serial:/dev/ttyUSB0'
     """
     _named("serial:PORT", argument)
-    options = take_options(description, {"baud", *_TIMES}, kind="serial rig", loaded=True)
+    options = take_options(description, {"baud", *_TIMES}, kind="serial rig")
     line = made_of(
         SerialClient, {"port": argument, **_some(options, {"baud"})}, kind_name="serial rig"
     )
@@ -56,7 +56,7 @@ def build_can(argument: str, description: Description) -> WireRig:
     """
     _named("can:CHANNEL", argument)
     own = {"interface", "bitrate"}
-    options = take_options(description, own | _TIMES, kind="CAN rig", loaded=True)
+    options = take_options(description, own | _TIMES, kind="CAN rig")
     bus = made_of(CanClient, {"channel": argument, **_some(options, own)}, kind_name="CAN rig")
     return _over(bus, options, description, kind="CAN rig")
 
@@ -84,4 +84,5 @@ def _expected(description: Description) -> Hello:
         unit=description.unit,
         rate=description.rate,
         limits=description.stated_limits(),
+        watchdog=description.watchdog,
     )

@@ -6,11 +6,13 @@ from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RigError
 from hmpim.rigs.block import Block, ChannelSpec, Layout, RunReport, Samples
+from hmpim.rigs.clock import Clock
 from hmpim.rigs.mounted.carried import CarriedSensor
-from hmpim.rigs.protocol import LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
+from hmpim.rigs.protocol import Clocked, LimitsOfAxes, Reporting, Rig, Seeded, Stimuli
 from hmpim.rigs.sensor import Sensor
 
 __all__ = ["Mounted", "Unit"]
@@ -150,6 +152,12 @@ class Mounted:
             if isinstance(rig, Seeded):
                 rig.seed(own)
 
+    def use_clock(self, clock: Clock, /) -> None:
+        """Let both go by the clock of the run, as far as they go by one."""
+        for rig in (self._carrier, self._unit):
+            if isinstance(rig, Clocked):
+                rig.use_clock(clock)
+
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             self._carrier.__enter__()
@@ -202,7 +210,7 @@ class Mounted:
             source=f"{self._unit.name} on {layout.source or self._carrier.name}",
         )
 
-    def play(self, block: Block, /) -> Mapping[str, Samples]:
+    def play(self, block: Block, /) -> Mapping[str, ArrayLike | Samples]:
         """Let the carrier play, and read the unit.
 
         Raises
@@ -216,18 +224,12 @@ class Mounted:
                 f"{self._carrier.name!r} returns an array; a carrier must return its channels by "
                 "name"
             )
-        came = {
-            name: given
-            if isinstance(given, Samples)
-            else Samples(time=block.time, values=np.asarray(given, dtype=np.float64))
-            for name, given in (reply or {}).items()
-        }
-        moved = {
-            axis: came[spec.name] for axis, spec in self._encoders.items() if spec.name in came
-        }
+        given = dict(reply or {})
+        encoded = {axis: spec.name for axis, spec in self._encoders.items() if spec.name in given}
+        moved = {axis: _stamped(given[name], block) for axis, name in encoded.items()}
         waited = block.pace is not None and block.pace.now() > 0.0
         now = block.pace.now() if waited and block.pace is not None else float(block.time[-1])
-        return {**came, **self._unit.read(now, moved)}
+        return {**given, **self._unit.read(now, moved)}
 
     def stop(self) -> None:
         """Stop the carrier, then the unit."""
@@ -243,3 +245,10 @@ class Mounted:
             findings=tuple(finding for one in said for finding in one.findings),
             clocks={name: retime for one in said for name, retime in one.clocks.items()},
         )
+
+
+def _stamped(given: ArrayLike | Samples, block: Block) -> Samples:
+    """Samples of an encoder, at the times of the block where they bring none."""
+    if isinstance(given, Samples):
+        return given
+    return Samples(time=block.time, values=np.asarray(given, dtype=np.float64))

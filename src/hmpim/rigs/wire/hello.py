@@ -156,7 +156,8 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
     Raises
     ------
     RigError
-        If axes, units, rate or limits differ, or units cannot be compared; the message says both.
+        If axes, units, rate or limits differ, units cannot be compared, or the watchdog is slower
+        than expected; the message says both.
         If the far end leaves one of the first three out.
 
     Examples
@@ -176,6 +177,12 @@ def check_agreement(expected: Hello, stated: Hello) -> None:
         raise RigError(
             f"{who} runs at {stated.rate:g} Hz, and {expected.rate:g} Hz is expected; design the "
             "stimulus at its rate, or start it at the stimulus's"
+        )
+    silence, allowed = stated.watchdog, expected.watchdog
+    if silence is not None and allowed is not None and silence > allowed * (1.0 + _SAME):
+        raise RigError(
+            f"{who} brakes after {silence:g} s of silence, and a watchdog of {allowed:g} s is "
+            "expected; correct the rig file"
         )
     for k, axis in enumerate(expected.axes):
         if axis not in stated.axes:

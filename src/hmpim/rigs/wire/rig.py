@@ -46,7 +46,7 @@ class WireRig:
     answer : float
         Seconds in which a far end must answer a question.
     homing : float
-        Seconds in which it must have gone to its start.
+        Seconds in which it must have gone to its start, or come to rest.
     stale : float
         Seconds without a response after which the run is given up.
     """
@@ -117,8 +117,10 @@ class WireRig:
         trace: TracebackType | None,
         /,
     ) -> None:
-        self._say(Kind.BYE)
-        self._transport.close()
+        try:
+            self._say(Kind.BYE)
+        finally:
+            self._transport.close()
 
     def prepare(self, stimulus: Stimuli, /) -> Layout:
         """Check the rate and send the far end to its start; it moves there slowly.
@@ -187,7 +189,7 @@ class WireRig:
         return account.take(everything=block.last)
 
     def stop(self) -> None:
-        """Tell the far end to brake, until it says that it stands.
+        """Tell the far end to brake, until it says that it stands; braking may take its time.
 
         Raises
         ------
@@ -196,7 +198,8 @@ class WireRig:
         """
         if self._stated is None:
             return
-        deadline = self._clock.now() + self._answer
+        begun = self._clock.now()
+        deadline = begun + self._answer
         while self._clock.now() < deadline:
             before = self._heard
             self._say(Kind.STOP)
@@ -205,6 +208,8 @@ class WireRig:
                 pass
             if self._heard > before and self._state in _STANDING:
                 return
+            if self._heard > before and self._state is State.BRAKING:
+                deadline = min(self._heard + self._answer, begun + self._homing)
         watchdog = self.watchdog
         braking = (
             f"its watchdog brakes it after {watchdog:g} s of silence"
@@ -213,7 +218,7 @@ class WireRig:
         )
         raise RigError(
             f"{self.name!r} at {self._transport.name} was told to stop and did not confirm within "
-            f"{self._answer:g} s that it stands still; {braking}"
+            f"{deadline - begun:.3g} s that it stands still; {braking}"
         )
 
     def report(self) -> RunReport:
@@ -372,7 +377,12 @@ def _row(orders: tuple[FloatArray, FloatArray, FloatArray], k: int) -> Command:
 
 
 def expected_hello(
-    *, axes: tuple[str, ...], unit: str, rate: float | None, limits: LimitsOfAxes
+    *,
+    axes: tuple[str, ...],
+    unit: str,
+    rate: float | None,
+    limits: LimitsOfAxes,
+    watchdog: float | None = None,
 ) -> Hello:
     """Return what a rig file expects of the far end.
 
@@ -389,4 +399,5 @@ def expected_hello(
         units=tuple(unit for _ in axes) if unit else (),
         rate=rate,
         limits={} if limits is None else dict(limits),
+        watchdog=watchdog,
     )

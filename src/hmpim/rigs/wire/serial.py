@@ -20,7 +20,7 @@ def open_line(port: str, baud: int) -> Any:
     MissingExtraError
         If pyserial is not installed.
     RigError
-        If there is no such port.
+        If there is no such port, or another program has it open.
     """
     try:
         import serial
@@ -29,7 +29,7 @@ def open_line(port: str, baud: int) -> Any:
             "serial lines need pyserial; install it with pip install 'hmpim[serial]'"
         ) from error
     try:
-        return serial.Serial(port, baud, timeout=0, write_timeout=0.1)
+        return serial.Serial(port, baud, timeout=0, write_timeout=0.1, exclusive=True)
     except (OSError, ValueError) as error:
         raise RigError(f"serial:{port} cannot be opened: {error}") from error
 

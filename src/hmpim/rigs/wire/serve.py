@@ -18,6 +18,7 @@ __all__ = ["Plant", "Server", "Trace", "serve"]
 FloatArray = NDArray[np.float64]
 
 _NANO = 1e9
+_OVERDUE = 64  # datagrams that are still taken when a tick is due: a flood must not put it off
 
 
 class Plant(Protocol):
@@ -130,14 +131,15 @@ def serve(
     peer: object = None
     tick, ending = 0, False
     while not ending or farend.state in (State.MOVING, State.BRAKING):
-        due = begun + tick * period
-        while True:
+        due, overdue = begun + tick * period, 0
+        while overdue < _OVERDUE:
             came = server.receive(max(0.0, due - clock.now()))
             now = clock.now()
             if came is None:
                 if now >= due:
                     break
                 continue
+            overdue += now >= due
             data, sender = came
             before = farend.session
             for answer in farend.receive(data, now=round(now * _NANO)):
@@ -147,8 +149,9 @@ def serve(
         order = farend.tick()
         try:
             measured = plant.advance(order)
-        except RigError as error:
-            farend.trip(str(error))
+        except Exception as error:  # whatever fails, the rig is brought to rest
+            own = isinstance(error, RigError)
+            farend.trip(str(error) if own else f"{type(error).__name__}: {error}")
             measured = plant.truth()
         if peer is not None:
             for said in farend.pending():
@@ -159,7 +162,10 @@ def serve(
             if response is not None:
                 server.send(response, peer)
         if trace is not None:
-            trace.add(tick, due, farend, order, plant.truth())
+            try:
+                trace.add(tick, due, farend, order, plant.truth())
+            except OSError:  # a full disk; it is said when the trace is closed
+                trace = None
         tick += 1
         if not ending and until():
             ending = True

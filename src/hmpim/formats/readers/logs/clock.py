@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, UnitError
-from hmpim.formats.readers.text import TIME_NAMES, named
+from hmpim.formats.readers.text import TIME_NAMES, named, unlikely_seconds
 from hmpim.record import Finding
 from hmpim.units import conversion_factor
 
@@ -50,7 +50,11 @@ class ClockColumn:
         unit = self.unit or unix or "s"
         factor = conversion_factor(unit, to="s")
         if unix is None or (self.unit and size * factor < _UNIX[-1][0]):
-            return _scaled(values, factor), None, ()
+            return (
+                _scaled(values, factor),
+                None,
+                () if self.unit else unlikely_seconds(self.name, values),
+            )
         base = float(np.floor(finite.min()))
         told = Finding(
             code="time_unit",

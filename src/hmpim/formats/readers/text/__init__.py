@@ -4,6 +4,7 @@ from hmpim.formats.readers.text.headings import named
 from hmpim.formats.readers.text.notes import KINDS, MARK, heading_of
 from hmpim.formats.readers.text.reader import TEXT, TIME_NAMES, list_table, read_table
 from hmpim.formats.readers.text.source import MAX_EXPANDED, MAX_LINE, read_text
+from hmpim.formats.readers.text.stamps import unlikely_seconds
 
 __all__ = [
     "KINDS",
@@ -17,4 +18,5 @@ __all__ = [
     "named",
     "read_table",
     "read_text",
+    "unlikely_seconds",
 ]

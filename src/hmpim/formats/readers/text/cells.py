@@ -19,6 +19,7 @@ __all__ = [
     "numbers",
     "split_row",
     "split_rows",
+    "thousands",
     "without_codes",
 ]
 
@@ -28,6 +29,10 @@ BLANKS = " "
 _MINUS = "\u2212"  # as typesetters and some spreadsheets write it
 
 DECIMAL_COMMA = re.compile(rf"^\s*[-+{_MINUS}]?\d+,\d+([eE][-+{_MINUS}]?\d+)?\s*$")
+
+_THOUSANDS = re.compile(rf"[-+{_MINUS}]?[1-9]\d{{0,2}},\d{{3}}")
+_HUNDREDS = re.compile(rf"[-+{_MINUS}]?[1-9]\d{{2}}")
+_FEW = 3  # numbers with a comma, from which their form says what it is
 
 # Where a comma is the decimal sign, a point may part thousands: it makes no number.
 _COMMA = str.maketrans({",": ".", ".": "_"})
@@ -118,6 +123,24 @@ def number(cell: str, decimal: str) -> float | None:
         if lower in _MISSING:
             return math.nan
         return _WORDS.get(lower)
+
+
+def thousands(cells: Sequence[str]) -> tuple[str, str] | None:
+    """Return two cells of a column whose commas mark thousands and no fractions; else None.
+
+    Three digits follow every comma, none before it is a zero alone, and numbers from 100 to 999
+    have no comma.
+
+    Examples
+    --------
+    >>> thousands(["999", "1,025", "2,311", "-1,733"]), thousands(["0,999", "1,025", "2,311"])
+    (('1,025', '999'), None)
+    """
+    marked = [cell for cell in cells if "," in cell]
+    plain = next((cell for cell in cells if _HUNDREDS.fullmatch(cell)), None)
+    if plain is None or len(marked) < _FEW or not all(map(_THOUSANDS.fullmatch, marked)):
+        return None
+    return marked[0], plain
 
 
 def is_complex(cell: str, decimal: str) -> bool:

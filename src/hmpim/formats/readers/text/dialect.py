@@ -16,6 +16,7 @@ __all__ = ["Dialect", "decimal_in", "find_dialect", "is_comment", "is_row", "unc
 _DELIMITERS = ("\t", ";", ",", "|", BLANKS)
 _COMMENTS = ("#", "%", "//", "!")
 _SAMPLE = 100  # rows from which the dialect is told
+_JSON = re.compile(r"\s*[\[{]\s*[\[{\"]")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,10 +116,10 @@ def find_dialect(lines: Sequence[str], *, name: str) -> Dialect:
         for decimal in (".", ",")
         if (trial := _tried(rows, sample, delimiter, decimal, rank)) is not None
     ]
-    if not trials and rows[0][1].lstrip().startswith("{"):
+    if _JSON.match(rows[0][1]) or (not trials and rows[0][1].lstrip().startswith("{")):
         raise FormatError(
-            f"{name!r} holds JSON and no table of samples; a result that hmpim identify wrote "
-            "is opened with hmpim report, hmpim export or hmpim.load"
+            f"{name!r} holds JSON and no table of samples; export the samples as CSV. A result "
+            "that hmpim identify wrote is opened with hmpim report, hmpim export or hmpim.load"
         )
     if not trials and len(rows) == 1:
         cells = next((c for d in delimiters if len(c := _cells(rows[0][1], d)) > 1), None)

@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers.protocol import listed
@@ -123,7 +123,8 @@ def find_headings(
     Returns
     -------
     headings : tuple of Heading
-        Columns that have a name, and others of numbers but the first, called 'column 2', ….
+        Columns that have a name, and others of numbers, called 'column 2', …; but for a first one
+        that only counts the rows.
         Without a line of names all are called so.
     printed : bool
         False if the file has no line of names.
@@ -150,7 +151,7 @@ def find_headings(
         ), False
     found = []
     for k, cell in enumerate(cells[: dialect.width]):
-        if not cell and k and dialect.numeric[k]:  # the first one is a table's index
+        if not cell and dialect.numeric[k] and (k or not _is_an_index(lines, dialect)):
             cell = f"column {k + 1}"
         if not cell:
             continue
@@ -159,6 +160,15 @@ def find_headings(
             unit = "" if units[k] in _NO_UNIT else read_unit(units[k]) or units[k]
         found.append(Heading(text=cell, name=short, unit=unit, position=k))
     return _with_vertical_units(_told_apart(found), above, dialect), True
+
+
+def _is_an_index(lines: Sequence[str], dialect: Dialect) -> bool:
+    """Whether the first column counts the rows, as pandas writes it."""
+    rows = [line for line in lines[dialect.first :] if line.strip()][:3]
+    cells = [split_row(row, dialect.delimiter)[0] for row in rows]
+    if not all(cell.isdecimal() for cell in cells):
+        return False
+    return all(int(b) == int(a) + 1 for a, b in pairwise(cells))
 
 
 def _with_vertical_units(

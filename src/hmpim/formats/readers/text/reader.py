@@ -21,7 +21,12 @@ from hmpim.formats.readers.text.headings import Heading, named
 from hmpim.formats.readers.text.instruments import stated_time_unit
 from hmpim.formats.readers.text.notes import Notes, read_notes
 from hmpim.formats.readers.text.source import is_text, open_source
-from hmpim.formats.readers.text.stamps import StampColumn, looks_like_stamp, stamp_column
+from hmpim.formats.readers.text.stamps import (
+    StampColumn,
+    looks_like_stamp,
+    stamp_column,
+    unlikely_seconds,
+)
 from hmpim.formats.readers.text.table import Lines, Table, open_table, read_columns
 from hmpim.record import Finding, Series
 from hmpim.units import conversion_factor
@@ -155,10 +160,12 @@ def _clock(
         clock, unit = _clock_column(table, headings, layout)
     if clock is None:
         return None, None, ()
+    unit = unit or clock.unit or stated_time_unit(table.start)
+    cells = table.sample(clock.position)
     try:
         stamps = stamp_column(
-            table.sample(clock.position),
-            unit=unit or clock.unit or stated_time_unit(table.start),
+            cells,
+            unit=unit,
             decimal=table.dialect.decimal,
             heading=clock.text,
             exact=own,
@@ -166,7 +173,9 @@ def _clock(
     except (FormatError, UnitError) as error:
         raise type(error)(f"{file!r}, {error}") from None
     if not stamps.told_by_size:
-        return clock, stamps, ()
+        first = np.empty(0) if unit or stamps.kind != "number" else stamps.seconds(cells)
+        slow = () if isinstance(first, int) else unlikely_seconds(clock.name, first)
+        return clock, stamps, slow
     told = Finding(
         code="time_unit",
         message=(

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from hmpim.errors import FormatError, UnitError
 from hmpim.formats.readers.text.cells import column_of
+from hmpim.record import Finding
 from hmpim.units import conversion_factor
 
-__all__ = ["StampColumn", "looks_like_stamp", "stamp_column"]
+__all__ = ["StampColumn", "looks_like_stamp", "stamp_column", "unlikely_seconds"]
 
 Kind = Literal["number", "unix", "date", "clock"]
 
@@ -28,6 +29,10 @@ _PATTERNS = (
 _CLOCK_ALONE = re.compile(rf"^{_CLOCK}$")
 _DAY = 86_400
 _NANO = 10**9
+
+_SECOND_IN_DAYS = 1.2e-5
+_FIRST_DAY, _LAST_DAY = 1e4, 1e7
+"""Days that spreadsheets, MATLAB and astronomers count to our time: 46 000, 740 000, 2 500 000."""
 
 _UNIX = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """Smallest number that is Unix time in a unit: 1973 in ns, us and ms."""
@@ -188,6 +193,34 @@ def _nanoseconds(cell: str, kind: Kind) -> int | None:
         shift = int(zone[1:3]) * 3600 + int(zone[-2:]) * 60
         ticks -= (shift if zone[0] == "+" else -shift) * _NANO
     return int(day.astype(np.int64)) * _DAY * _NANO + ticks
+
+
+def unlikely_seconds(name: str, stamps: NDArray[np.float64]) -> tuple[Finding, ...]:
+    """Say that stamps without a unit are read in s, where their steps look like ms or days.
+
+    Examples
+    --------
+    >>> unlikely_seconds("time", np.array([0.0, 5.0, 10.0]))[0].message[:55]
+    "'time' states no unit and is read in s: a sample every "
+    >>> unlikely_seconds("time", np.array([0.0, 0.005, 0.01]))
+    ()
+    >>> days = 739686.0 + np.array([0.0, 1e-7, 2e-7])
+    >>> "if it is in days" in unlikely_seconds("time", days)[0].message
+    True
+    """
+    stamps = stamps[np.isfinite(stamps)]
+    step = float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
+    if step >= 1.0:
+        unit, words = "ms", "ms"
+    elif 0.0 < step < _SECOND_IN_DAYS and _FIRST_DAY < stamps[0] < _LAST_DAY:
+        unit, words = "d", "days"
+    else:
+        return ()
+    message = (
+        f"{name!r} states no unit and is read in s: a sample every {step:g} s; if it is in "
+        f"{words}, write '{name} [{unit}]' into the heading, or as --time"
+    )
+    return (Finding(code="time_unit", message=message, severity="info", parameters=()),)
 
 
 def _largest(cells: Sequence[str], decimal: str) -> float:

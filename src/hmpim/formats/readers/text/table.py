@@ -1,5 +1,6 @@
 """A table of text: its start understood, its samples still on disk."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -19,6 +20,7 @@ from hmpim.formats.readers.text.cells import (
     numbers,
     split_row,
     split_rows,
+    thousands,
     without_codes,
 )
 from hmpim.formats.readers.text.dialect import (
@@ -35,6 +37,7 @@ from hmpim.formats.readers.text.stamps import StampColumn, looks_like_stamp
 
 __all__ = ["Columns", "Lines", "Table", "open_table", "read_columns"]
 
+_MARKED = re.compile(r"[-+]?\d{1,3}([,.' ]\d{3})+([.,]\d+)?")
 _HEAD = 1500  # lines from which a table is understood
 _ENOUGH = 50  # numbers, of which one of equal length is the shortest with a chance of 2 %
 
@@ -139,7 +142,7 @@ def open_table(text: Lines) -> Table:
         names = listed([h.name for h in headings])
         raise FormatError(f"{text.name!r} has column names ({names}) and no samples; record again")
     comments = tuple(uncommented(line) for line in lines[: dialect.first] if is_comment(line))
-    return Table(
+    table = Table(
         lines=text,
         start=tuple(lines),
         comments=comments,
@@ -148,6 +151,20 @@ def open_table(text: Lines) -> Table:
         printed=printed,
         steady=steady,
     )
+    if dialect.decimal == ",":
+        _refuse_thousands(table)
+    return table
+
+
+def _refuse_thousands(table: Table) -> None:
+    """Refuse columns in which 1,025 is a thousand times as much as it would be read."""
+    for column in table.headings:
+        found = thousands(table.sample(column.position))
+        if found is not None:
+            raise FormatError(
+                f"{table.lines.name!r}, column {column.text!r} holds {found[0]!r} and {found[1]!r}:"
+                " its commas mark thousands; export the file without such marks"
+            )
 
 
 def _is_steady(heading: Heading, steady: Steady) -> bool:
@@ -370,6 +387,8 @@ def _said_cell(table: Table, column: Heading, cell: str, line: int) -> str:
         return f"{where} holds {cell!r}, a decimal comma; export the file with decimal points"
     if table.dialect.decimal == "," and number(cell, ".") is not None:
         return f"{where} holds {cell!r}, where a decimal comma is used elsewhere; write one way"
+    if _MARKED.fullmatch(cell):
+        return f"{where} holds {cell!r}, with marks for thousands; export the file without them"
     if is_complex(cell, table.dialect.decimal):
         return f"{where} holds {cell[:40]!r}: {COMPLEX}"
     return f"{where} holds {cell[:40]!r}, which is not a number; correct it, or cut that row out"
