@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.regrouped import regrouped
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 
@@ -67,6 +68,7 @@ def climb(
 
     The damping follows how well the quadratic model predicts each step (J. Nocedal and S. J.
     Wright, Numerical Optimization, 2nd ed., 2006, section 4.1). Parameters at a bound are held.
+    Where two real poles meet, the search continues with the poles grouped anew.
 
     Parameters
     ----------
@@ -131,7 +133,15 @@ def climb(
                 damping = max(damping / 10.0, 1e-9)
         return best, False
 
-    return descended(evaluated(thetas))
+    best, converged = descended(evaluated(thetas))
+    other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
+    if all(theta is None for theta in other):
+        return best, converged
+    grouped = [
+        here if theta is None else theta for here, theta in zip(best.thetas, other, strict=True)
+    ]
+    again, ended = descended(evaluated(bounded(grouped)))
+    return (again, ended) if again.cost <= best.cost else (best, converged)
 
 
 def _free_directions(

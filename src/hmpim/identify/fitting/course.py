@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
-from hmpim.identify.fitting.beginning import REACH, begin_at, count_in, in_motion
+from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
     almost_integrates,
@@ -324,6 +324,17 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     )
     if not required and not any(fit.is_white for fit in richer):
         return course, fitted
+    if richer and course.counted.begins is not None:
+        leading = min(richer, key=lambda f: f.objective)
+        from_rest = refit(data.problem(course.natural, course.given), leading)
+        resting = count_in(data, course.natural, [from_rest], course.given, course.known)
+        # If it is at rest after all, the structure was wrong, and not the beginning.
+        at_rest = resting.begins is None
+        counted = resting if at_rest else begin_later(course.counted, leading)
+        if counted is not None:
+            course = replace(course, counted=counted)
+            every = _again(course, [*fits, *richer])
+            fits, richer = every[: len(fits)], every[len(fits) :]
     course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
     return course, continue_between(course)
 
