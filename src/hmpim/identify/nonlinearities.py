@@ -125,13 +125,14 @@ def _fitted_with(
 def _is_promising(
     one: Nonlinearity, problem: Problem, plain: Fit, joint: JointFit, former: Problem, count: int
 ) -> bool:
-    """Whether the row makes plain dynamics suffice, or is worth its price with those that lead."""
-    if refit(with_row(problem, one), plain).is_white:
-        return True
+    """Whether the row is worth its price with plain dynamics, or with those that lead."""
     best = joint.best.fit
-    data = with_row(joint.problem, one)
-    rich = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, best)))
-    return criterion_gain(rich, count, best, former) > 0.0
+    for before, fit in ((joint.problem, best), (problem, plain)):
+        data = with_row(before, one)
+        again = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, fit)))
+        if criterion_gain(again, count, best, former) > 0.0:
+            return True
+    return False
 
 
 def looked_through(
