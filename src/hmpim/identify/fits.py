@@ -17,6 +17,7 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
+from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -162,6 +163,9 @@ class _WithRows:
         unrelated = {i: fit for i, fit in enumerate(steady.fits) if not fit.related}
         self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
         joint, drifting = with_drift(before, self.with_rows, self.steadily)
+        if self.unrelated and drifting is not None:
+            self.unrelated = {}
+            joint, drifting = with_drift(before, self.with_rows, self.steadily)
         humming = self.humming
         if drifting is not None:
             steady = self.latest
@@ -175,10 +179,12 @@ class _WithRows:
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        question = self.question
+        question, before = self.question, self.latest
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = fit_once(question, self.seen, names, every, excluded=self.unrelated)
+        if not self.several and not plainly and before is not self.first:
+            self.latest = _as_before(question, self.seen, every, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -193,6 +199,23 @@ class _WithRows:
         hum = None if self.humming is None else self.humming.rows
         self.freed = _all_free(self.question, self.latest, self.asked, hum)
         return None if self.freed is None else self.freed.fits[self.asked]
+
+
+def _as_before(
+    question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
+) -> OutputFit:
+    """The fit that a search with `rows` found, or the plainer dynamics found before if likelier.
+
+    A search may end in a large number of modes.
+    """
+    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
+    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
+        return found
+    course = completed(turn_ahead(started(question, seen, rows)))
+    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
+    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
+    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
+    return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
 def _plain_beside_drift(
