@@ -269,6 +269,7 @@ def _evidence(
         highest=min(band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
         others=_other_explanations(gaining, joined.drifting if i == joined.asked else None),
+        owed=evidence.owed,
     )
     if any(one.matters for one in moves):
         whole = blurred(whole, WORTH)

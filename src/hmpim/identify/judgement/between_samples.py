@@ -30,7 +30,7 @@ _WORDS = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
 def other_intersample(evidence: Evidence) -> Iterator[Finding]:
     """Name the assumptions that fit as well: the intervals cover them."""
     best, rivals = evidence.joint.best, []
-    for trial in rivals_of(evidence.joint):
+    for trial in rivals_of(evidence.joint, evidence.owed):
         name = trial.fit.structure.name
         other = name if name != best.fit.structure.name else ""
         rivals.append((trial.intersample, trial.fit.delay - best.fit.delay, other))
@@ -93,7 +93,7 @@ def wide_span(evidence: Evidence) -> Iterator[Finding]:
     if not wide:
         return
     named = ", ".join(f"{in_words(name)} {span}" for name, span in wide.items())
-    between = bool(rivals_of(evidence.joint))
+    between = bool(rivals_of(evidence.joint, evidence.owed))
     yield Finding(
         code="intersample" if between else "structure",
         message=f"Models that this record cannot distinguish differ widely: {named}. "

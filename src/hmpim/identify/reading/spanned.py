@@ -47,10 +47,12 @@ _FAST = (
 """Figures that grow without limit as a second pole becomes infinitely fast, bandwidths last."""
 
 
-def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
+def rivals_of(joint: JointFit, owed: float = 0.0) -> tuple[Trial, ...]:
     """The likeliest trial under each other assumption that the record does not exclude.
 
     Software has one assumption: there these are all filters and delays that are about as likely.
+    `owed` is the share of the best trial's residual that still follows the input: no model here
+    describes it, it is not noise, and a smaller difference excludes nothing.
     """
     best = joint.best
     if best.fit.structure.sampled:
@@ -59,7 +61,12 @@ def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
     for trial in sorted(joint.trials, key=lambda trial: trial.criterion):
         if trial.intersample != best.intersample:
             others.setdefault(trial.intersample, trial)
-    return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
+    most = (1.0 + owed) * best.fit.objective if owed else 0.0
+    return tuple(
+        t
+        for t in others.values()
+        if t.criterion - best.criterion < 2 * CLEARLY or t.fit.objective < most
+    )
 
 
 def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
@@ -120,6 +127,7 @@ def spanned(
     highest: float,
     bent: Iterable[tuple[Fit, Real]] = (),
     others: Iterable[Fit] = (),
+    owed: float = 0.0,
 ) -> Parameters:
     """Widen each interval to cover the other assumptions and one more pole.
 
@@ -127,14 +135,14 @@ def spanned(
     trial's parameters is moved to their value, with its width unchanged. `bent` holds linear fits,
     each with the change of its parameters, (p,), by a possible nonlinearity; `others` are fits with
     a gain that may have changed, or a bias that may have drifted. Beyond `highest`, in Hz, no
-    bandwidth is read off.
+    bandwidth is read off; `owed` is as for `rivals_of`.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
         # The bandwidth of another model may lie beyond the band.
         return [_or_beyond(figures_of(fit, fs=fs, highest=fs / 2), fit) for fit in fits]
 
-    rivals = rivals_of(joint)
+    rivals = rivals_of(joint, owed)
     between = figures(trial.fit for trial in rivals)
     between += figures(fit for rival in rivals for fit in _ends(rival))
     richer = figures(
