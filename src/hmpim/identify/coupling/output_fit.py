@@ -23,7 +23,7 @@ from hmpim.identify.coupling.joint_errors import common, covariances, derivative
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
-from hmpim.identify.effects.drift import Drifting
+from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
@@ -254,7 +254,7 @@ def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
     """Fit inputs that explain a large part of the residual, in place, the strongest first."""
     tried: dict[int, JointFit] = {}
-    share = _shares(inputs, pairs)
+    share, summed = _shares(inputs, pairs)
     while share:
         counted = pairs.counted(pairs.strong)
         likely = _likely(share)
@@ -263,18 +263,18 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        if _is_large(tried[i]) and _responds(tried[i]):
+        if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
-            tried, share = {}, _shares(inputs, pairs)  # the residual is clearer now
+            tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
 
 
-def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
+def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:
     """Amplitude (r.m.s.) that each input, or its sum, explains, if it is much of the residual.
 
-    Friction correlates with an input that does not cause it; a response to an input follows it over
-    all its band.
+    The second value is the inputs of which only the sum does. Friction correlates with an input
+    that does not cause it; a response to an input follows it over all its band.
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
@@ -282,6 +282,7 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
         counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
+    sums: set[int] = set()
     rare = FALSE_ALARM / max(len(waiting), 1)
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
@@ -293,7 +294,8 @@ def _shares(inputs: list[Real], pairs: Pairs) -> dict[int, float]:
                 found[j] = share
         elif (share := _sum_in(inputs[j], rest, rare)) > least:
             found[j] = share
-    return found
+            sums.add(j)
+    return found, sums
 
 
 def _sum_in(u: Real, rest: Real, rare: float = FALSE_ALARM) -> float:
@@ -325,16 +327,23 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
     return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
 
 
-def _responds(tried: JointFit) -> bool:
-    """Whether the output responds to an input, rather than drifts.
+def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
+    """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
     A response so late that it leaves out most of the record explains errors of the stronger inputs'
-    models, such as friction. A pole as slow as the record also explains a drift.
+    models, such as friction. A pole as slow as the record also explains a drift: it counts only
+    if a drift explains less than the sum does.
     """
     problem, fit = tried.problem, tried.best.fit
     if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
         return False
-    return not spans_record(fit)
+    slow = spans_record(fit)
+    if not slow or not summed:
+        return not slow
+    rows = drift_rows(problem.y.size)
+    rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
+    drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
+    return spans_record(drifting) or fit.cost < drifting.cost
 
 
 def _follows_at_all(u: Real, y: Real) -> float:
