@@ -22,6 +22,7 @@ from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, 
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
+from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
@@ -307,7 +308,7 @@ def is_unanswered(course: Course, fitted: Fits) -> bool:
 
 
 def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
-    """Fit richer structures while the residual follows the input.
+    """Fit richer structures while the residual follows the input, then the plain ones again.
 
     A small residual that follows the input counts as missing dynamics only where a richer
     structure leaves white noise: on real hardware it usually has another cause.
@@ -335,6 +336,8 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
             course = replace(course, counted=counted)
             every = _again(course, [*fits, *richer])
             fits, richer = every[: len(fits)], every[len(fits) :]
+    if richer:
+        fits = reduced(course.problem, fits, richer)
     course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
     return course, continue_between(course)
 
