@@ -127,9 +127,9 @@ def _is_promising(
 ) -> bool:
     """Whether the row is worth its price with plain dynamics, or with those that lead."""
     best = joint.best.fit
-    for before, fit in ((joint.problem, best), (problem, plain)):
+    for before, begun in ((joint.problem, best), (problem, plain)):
         data = with_row(before, one)
-        again = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, fit)))
+        again = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, begun)))
         if criterion_gain(again, count, best, former) > 0.0:
             return True
     return False
