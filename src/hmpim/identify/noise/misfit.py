@@ -93,23 +93,13 @@ def misfits(
     """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
 
     `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
-    residuals, and `delays`, (k,), are in samples. In each group of neighbouring bins one gain from
-    the input explains what it can.
+    residuals, and `delays`, (k,), are in samples.
     """
-    first = max(int(np.ceil(band[0] * samples)), 1)
-    last = min(int(band[1] * samples), stimulus.size - 1)
-    width = max((last + 1 - first) // _GROUPS, 4)
-    groups = max(last + 1 - first, 0) // width
-    if not groups:
+    power, taken, total, width = _followed(
+        stimulus, residuals, samples=samples, delays=delays, band=band
+    )
+    if not power.size:
         return np.zeros(delays.size), np.ones(delays.size)
-    bins = np.arange(first, first + groups * width)
-    u = stimulus[bins].reshape(groups, width)
-    turn = np.exp((2j * np.pi / samples) * np.outer(delays, bins))
-    e = (residuals[:, bins] * turn).reshape(delays.size, groups, width)
-    power = np.sum(np.abs(u) ** 2, axis=1)
-    along = np.sum(u.conj() * e, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
-    taken = along.real**2 + along.imag**2  # of any unit
-    total = np.sum(e.real**2 + e.imag**2, axis=2)
     noise = (total - taken) / (width - 1)
     noisy = np.all(noise > 0, axis=1)
     noise, total = np.where(noisy[:, None], noise, 1.0), np.where(noisy[:, None], total, 1.0)
@@ -119,5 +109,30 @@ def misfits(
     beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
     return (
         np.where(noisy, np.maximum(beyond, 0.0), 0.0),
-        np.where(noisy, scipy.special.chdtrc(2 * groups, statistic), 1.0),
+        np.where(noisy, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
     )
+
+
+def _followed(
+    stimulus: Complex, answers: Complex, *, samples: int, delays: Real, band: tuple[float, float]
+) -> tuple[Real, Real, Real, int]:
+    """Explain each answer by one gain from the input in each group of neighbouring bins.
+
+    Returned are the power of the input in each group, (g,), the explained and the total power of
+    each answer, both (k, g), and the number of bins in a group. A band with too few bins has no
+    groups.
+    """
+    count, n = answers.shape[0], samples
+    first = max(int(np.ceil(band[0] * n)), 1)
+    last = min(int(band[1] * n), stimulus.size - 1)
+    width = max((last + 1 - first) // _GROUPS, 4)
+    groups = max(last + 1 - first, 0) // width
+    bins = np.arange(first, first + groups * width)
+    U = stimulus[bins].reshape(groups, width)
+    E = (answers[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
+        count, groups, width
+    )
+    power = np.sum(np.abs(U) ** 2, axis=1)
+    along = np.sum(U.conj() * E, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
+    taken = along.real**2 + along.imag**2  # of any unit
+    return power, taken, np.sum(E.real**2 + E.imag**2, axis=2), width
