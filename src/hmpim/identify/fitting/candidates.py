@@ -27,8 +27,9 @@ from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
+from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import MATERIAL, MOST, MUCH, NEARLY, PART, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 
@@ -383,12 +384,14 @@ def _best_sample(problem: Problem, best: Fit) -> Fit:
 def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
     """Share of the output (r.m.s.) by which the residual follows the input; 0 if by chance.
 
-    Infinite where much of the output is unexplained.
+    Infinite where part of the response is missed, or much of the output is unexplained.
     """
     misfit, spread = data.misfit(fit), problem.spread
     owed = 0.0
     if misfit.probability < FALSE_ALARM:
         owed = float(np.sqrt(misfit.share * fit.cost / spread)) if spread else 0.0
+        if owed <= MATERIAL and data.keeps_samples and _misses_part(problem, fit, data):
+            owed = np.inf
     return np.inf if owed <= MATERIAL and is_poor(fit, spread) else owed
 
 
@@ -405,6 +408,20 @@ def spans_record(fit: Fit) -> bool:
 def almost_integrates(fit: Fit) -> bool:
     """Whether the slowest pole is as slow as the record is long."""
     return slowest_time_constant(fit.denominator) > MUCH * fit.residual.size
+
+
+def _misses_part(problem: Problem, fit: Fit, data: Data) -> bool:
+    """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
+    span = slice(None)
+    if problem.valid is not None:
+        counted = np.flatnonzero(problem.valid)
+        span = slice(int(counted[0]), int(counted[-1]) + 1)
+        if counted.size < counted[-1] + 1 - counted[0]:
+            return False  # a spectrum needs samples without gaps
+    missed = unexplained_response(
+        data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=data.band
+    )
+    return missed > FEW
 
 
 def _without_second_pole(second_order: Fit) -> Real:

@@ -11,7 +11,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import transform_of, windowed_power
 from hmpim.identify.worth import DEEPEST, PART
 
-__all__ = ["Misfit", "misfit", "misfits"]
+__all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
 
 _GROUPS = 24
 """Most groups of neighbouring bins in the band."""
@@ -136,3 +136,32 @@ def _followed(
     along = np.sum(U.conj() * E, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
     taken = along.real**2 + along.imag**2  # of any unit
     return power, taken, np.sum(E.real**2 + E.imag**2, axis=2), width
+
+
+def unexplained_response(
+    u: Real, y: Real, residual: Real, *, delay: float, band: tuple[float, float]
+) -> float:
+    """Share of the response (r.m.s. over frequency) that is still in the residual, from 0 to 1.
+
+    A sweep within limits moves most at its low end, so a model may miss two thirds of the response
+    at the high end and still explain 99 % of the output's power. Here every group of bins has the
+    same weight. Twice the share that noise alone would explain is subtracted. Delay and band are
+    as for `misfit`.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> u = rng.standard_normal(2000)
+    >>> y = 2.0 * u
+    >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
+    0.1
+    """
+    answers, delays = np.asarray(scipy.fft.rfft(np.stack([y, residual]))), np.full(2, delay)
+    power, taken, total, width = _followed(
+        transform_of(u), answers, samples=u.size, delays=delays, band=band
+    )
+    excited = power > 0.0
+    noise = np.maximum(total - taken, 0.0) / (width - 1)
+    missed = np.maximum(taken - 2.0 * noise, 0.0)[1, excited] / power[excited]
+    gains = np.sum(taken[0, excited] / power[excited])
+    return float(np.sqrt(np.sum(missed) / gains)) if gains > 0.0 else 0.0
