@@ -125,6 +125,7 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     Examples
     --------
     >>> from hmpim.identify.fitting.fit import fit_structure
+    >>> from hmpim.model.sampled import prepare_input
     >>> from hmpim.model import STRUCTURES
     >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
     >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
