@@ -27,6 +27,7 @@ def here(tmp_path, monkeypatch, good):
     (tmp_path / "loop").symlink_to(tmp_path)
     os.link(good, tmp_path / "hard.csv")
     os.link(good, tmp_path / "parameters.csv")
+    os.link(good, tmp_path / "response-2.csv")
     for name in ("r.json", "plan.toml", "rig.toml", "unit.py"):
         (tmp_path / name).write_text(name)
 
@@ -58,6 +59,7 @@ ONE = "are one file"
         (("identify", "good.csv", "--json", "loop/good.csv"), LOST),
         (("identify", "a.csv", "good.csv", "--json", "good.csv"), LOST),
         (("identify", "parameters.csv", "--figures", "."), LOST),
+        (("identify", "response-2.csv", "--figures", "."), LOST),
         (("identify", "good.csv", "--json", "x", "--report", "x"), ONE),
         (("identify", "good.csv", "--json", "x", "--report", "loop/x"), ONE),
         ((*DESIGN, "-o", "s.csv", "--json", "s.csv"), ONE),

@@ -52,9 +52,10 @@ Figures = Annotated[
 
 
 def tables_in(figures: Path | None) -> list[Path]:
-    """Tables that --figures writes, which a record in that folder could be."""
-    names = ("parameters.csv", "response-1.csv")
-    return [] if figures is None else [figures / name for name in names]
+    """Tables of --figures, one of which a record in that folder could be."""
+    if figures is None:
+        return []
+    return [figures / "parameters.csv", *sorted(figures.glob("response-*.csv"))]
 
 
 def about_of(title: str, under_test: str, test: str, operator: str, date: str) -> "About":

@@ -142,8 +142,8 @@ class Running:
 
     def _felt(self, ready: _Ready, how: Feel, findings: list[Finding]) -> _Ready:
         """Move a little first, and return what may be moved then."""
-        grows = self._recorder(ready, path=self.path).growing
-        feeling = replace(self, until=None, subscribers=(), path=grows)
+        growing = self._recorder(ready, path=self.path).growing
+        feeling = replace(self, until=None, subscribers=(), path=growing)
 
         def play(stimuli: Mapping[str, Stimulus]) -> Record:
             with self._faults_logged():

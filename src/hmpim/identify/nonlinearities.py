@@ -96,10 +96,10 @@ def _with_with_row(question: Question, seen: Imperfections, fitted: OutputFit) -
         course = completed(turn_ahead(started(steady, seen, rows)))
         problem = course.problem
         known = joint.problem.fixed().shape[0] - problem.fixed().shape[0]
+        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural)
         for kind in kinds_in_question(command, problem, course.best, joint.best.fit):
             for one in settled_rows(kind, command, problem, course.best):
-                leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
                 if not _is_promising(one, problem, course.best, leading, joint.problem, 1 - known):
                     continue
                 beside = _fitted_with(steady, seen, problem, one)

@@ -20,7 +20,7 @@ from hmpim.errors import ArgumentError
 from hmpim.model.causal import causal_filter
 from hmpim.model.filters import in_z
 from hmpim.model.fractions import modal_form
-from hmpim.model.response import RationalDelay, response
+from hmpim.model.response import RationalDelay, per_step, response
 from hmpim.record import Intersample
 
 __all__ = ["TAPS", "Discrete", "RowPiece", "discretise", "realised", "rows_between"]
@@ -297,8 +297,8 @@ def _response(step: Discrete, z: NDArray[np.complex128]) -> NDArray[np.complex12
 
 def realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, float]:
     """State matrices per sample, scaled so that their entries are alike in size."""
-    a = np.trim_zeros(system.denominator * fs ** np.arange(system.denominator.size), "b")
-    b = system.numerator * fs ** np.arange(system.numerator.size)
+    a = np.trim_zeros(per_step(system.denominator, fs), "b")
+    b = per_step(system.numerator, fs)
     if a.size == 1:
         return np.zeros((0, 0)), np.zeros(0), np.zeros(0), float(b[0] / a[0])
     modal = modal_form(b, a)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.model.poles import rational_response
-from hmpim.model.response import RationalDelay
+from hmpim.model.response import RationalDelay, per_step
 from hmpim.model.sampled import SampledInput
 
 __all__ = ["driven"]
@@ -29,8 +29,8 @@ def driven(
     y = rational_response(
         source,
         delay=system.delay * fs - early,
-        numerator=system.numerator * fs ** np.arange(system.numerator.size),
-        denominator=system.denominator * fs ** np.arange(system.denominator.size),
+        numerator=per_step(system.numerator, fs),
+        denominator=per_step(system.denominator, fs),
     )
     level: float | NDArray[np.float64] = float(system.numerator[0]) * source.first
     if system.denominator[0] == 0:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from hmpim.model.sampled import MARGIN, delayed_response, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["FINE", "finely", "sampled"]
+__all__ = ["FINE", "finely", "joined", "sampled"]
 
 _Real = NDArray[np.float64]
 
@@ -28,7 +28,12 @@ def finely(u: _Real, mode: Intersample) -> _Real:
     source = prepare_input(u, mode)
     still = np.ones(1)
     steps = [delayed_response(source, delay=-k / FINE, denominator=still)[0] for k in range(FINE)]
-    return np.asarray(source.first + np.stack(steps, axis=1).ravel()[: 1 - FINE])
+    return np.asarray(source.first + joined(np.stack(steps, axis=1)))
+
+
+def joined(steps: _Real) -> _Real:
+    """Signal on the finer clock, from its values at each step after each sample, (n, FINE)."""
+    return np.asarray(steps.ravel()[: 1 - FINE])
 
 
 def sampled(fine: _Real) -> _Real:

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
 from hmpim.model.driven import driven
-from hmpim.model.fine import FINE, finely, sampled
+from hmpim.model.fine import FINE, finely, joined, sampled
 from hmpim.model.operators import play, power_of, rate_limited, rubbed
-from hmpim.model.response import RationalDelay
+from hmpim.model.response import RationalDelay, per_step
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
@@ -204,10 +204,10 @@ def nonlinear_effect(
     if part.at == "output" and part.kind != "backlash":
         return part.weight * power_of(driven(system, source, fs), part.power, part.reach)
     parts = [driven(system, source, fs, early=k / FINE) for k in range(FINE)]
-    x = np.stack(parts, axis=1).ravel()[: 1 - FINE]
+    x = joined(np.stack(parts, axis=1))
     if part.kind == "backlash":
         return np.asarray((play(x, part.size) - x)[::FINE])
-    return forced(part, system.denominator * fs ** np.arange(system.denominator.size), x)
+    return forced(part, per_step(system.denominator, fs), x)
 
 
 def excursion(
@@ -250,7 +250,7 @@ def friction(part: NonlinearPart, system: RationalDelay, fine: _Real, fs: float)
     held, free, _ = rubbed(
         fine,
         delay=system.delay * fs,
-        denominator=below * fs ** np.arange(3),
+        denominator=per_step(below, fs),
         gain=float(above[0]),
         force=part.size,
     )
@@ -293,7 +293,7 @@ def force_step(denominator: _Real) -> tuple[list[list[float]], list[float], list
     It is one of the finer clock; the denominator is by rising powers of s per sample. The second
     and third value multiply the force at its beginning and at its end.
     """
-    below = denominator * FINE ** np.arange(denominator.size)
+    below = per_step(denominator, FINE)
     order = below.size - 1
     if not order:
         return [], [], []

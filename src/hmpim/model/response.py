@@ -24,6 +24,7 @@ __all__ = [
     "dominant_time_constant",
     "log_slopes",
     "peak_gain",
+    "per_step",
     "phase",
     "response",
     "response_std",
@@ -55,6 +56,17 @@ class RationalDelay:
         if self.step is not None:
             return delta_of(frequency, self.step)
         return np.asarray(2j * np.pi * np.asarray(frequency, dtype=np.float64), dtype=np.complex128)
+
+
+def per_step(coefficients: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
+    """Coefficients by rising powers of s, with time in steps of which there are `rate` to its unit.
+
+    Examples
+    --------
+    >>> per_step(np.array([1.0, 0.5]), 200.0).tolist()
+    [1.0, 100.0]
+    """
+    return np.asarray(coefficients * rate ** np.arange(coefficients.size))
 
 
 def response(system: RationalDelay, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:

@@ -14,7 +14,7 @@ from hmpim.errors import ArgumentError
 from hmpim.model.fine import finely
 from hmpim.model.nonlinear import NonlinearPart, forced, friction
 from hmpim.model.operators import play, power_of, rate_limited
-from hmpim.model.response import RationalDelay
+from hmpim.model.response import RationalDelay, per_step
 from hmpim.record import Intersample
 
 __all__ = ["SteppedPart", "stepped_part"]
@@ -43,7 +43,7 @@ class SteppedPart:
     @property
     def denominator(self) -> _Real:
         """Of the dynamics, by rising powers of s per sample."""
-        return self.system.denominator * self.fs ** np.arange(self.system.denominator.size)
+        return per_step(self.system.denominator, self.fs)
 
     def entered(self, u: _Real) -> _Real:
         """The command as it reaches the linear part, (n,)."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
 from hmpim.model.fractions import modal_form
+from hmpim.model.response import per_step
 
 __all__ = [
     "REFINE",
@@ -111,8 +112,7 @@ def modal_matrices(source: Source) -> StateMatrices | None:
     through : float
     """
     system, fs = source.causal().system, source.fs
-    per_sample = (c * fs ** np.arange(c.size) for c in (system.numerator, system.denominator))
-    parts = modal_form(*per_sample)
+    parts = modal_form(per_step(system.numerator, fs), per_step(system.denominator, fs))
     if parts is None:
         return None
     generator, entry, output, through = parts

@@ -80,16 +80,14 @@ def with_drift(
         joint = fitted(every, False)
     columns = _shape(joint, every)
 
-    def gained(joint: JointFit) -> float | None:
-        gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
-        return None if gain < 0.0 else gain
-
-    gain = gained(joint)  # fewer rows explain no more
-    if gain is not None and len(columns) < len(every):  # choose again, with the drift known
-        joint = fitted(columns, plainly)
-        gain = gained(joint)
-    if gain is None:
+    gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
+    if gain < 0.0:  # fewer rows explain no more
         return first, None
+    if len(columns) < len(every):  # choose again, with the drift known
+        joint = fitted(columns, plainly)
+        gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
+        if gain < 0.0:
+            return first, None
     rival = first.best.fit if gain < 2 * LIKELIER else None
     return _unless_steady(joint, columns, steadily, rival)
 

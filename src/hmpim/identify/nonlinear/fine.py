@@ -6,7 +6,7 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.model.fine import FINE
+from hmpim.model.fine import FINE, joined
 
 __all__ = ["linear_part", "linear_part_finely"]
 
@@ -28,4 +28,4 @@ def linear_part_finely(problem: Problem, fit: Fit) -> Real:
         at = np.arange(driven.shape[0])
         free = scipy.interpolate.CubicSpline(at, linear_part(problem, fit) - driven[:, 0])
         driven += free(at[:, None] + np.arange(FINE) / FINE)
-    return np.asarray(driven.ravel()[: 1 - FINE])
+    return joined(driven)

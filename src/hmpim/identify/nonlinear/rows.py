@@ -31,6 +31,7 @@ from hmpim.identify.worth import MATERIAL, PART
 from hmpim.model.fine import FINE, finely, sampled
 from hmpim.model.nonlinear import Place
 from hmpim.model.operators import gap_crossed, play, power_of, pushed, rubbed
+from hmpim.model.response import per_step
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
@@ -203,8 +204,7 @@ def _forced(
     z = linear_part_finely(data, fit)
     z = z if own is None else z + own
     largest = _most(z)
-    slower = fit.denominator * FINE ** np.arange(fit.denominator.size)
-    fine = -pushed(power_of(z, power, largest), slower)
+    fine = -pushed(power_of(z, power, largest), per_step(fit.denominator, FINE))
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _forced(kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
