@@ -8,8 +8,9 @@ import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.model import STRUCTURES, prepare_input
-from hmpim.model.fine import FINE
+from hmpim.model.fine import FINE, finely
 from hmpim.model.operators import play, stick_slip
+from hmpim.model.operators import rubbed as with_friction
 from tests_support import in_studies
 
 FS, DELAY, OMEGA, ZETA = 200.0, 0.03, 2 * np.pi * 10.0, 0.4
@@ -186,3 +187,21 @@ def test_the_linear_part_between_the_samples(begins):
     )
     middle = hmpim.simulate(late, u, fs=FS, intersample="bandlimited")
     np.testing.assert_allclose(fine[FINE // 2 :: FINE][50:], middle[50:-1], atol=2e-3)
+
+
+def test_a_standard_deviation_beyond_which_the_model_is_unstable_is_no_step_of_a_derivative():
+    """A slow sine says little of dynamics, so that their error bars reach to unstable ones."""
+    t = np.arange(1200) / 100.0
+    u = 5.0 * np.sin(2 * np.pi * (0.5 + 0.001 * t) * t)
+    slow = 0.4 * np.pi  # 20 Hz, per sample
+    y, _, _ = with_friction(
+        finely(u, "bandlimited"),
+        delay=0.8,
+        denominator=np.array([1.0, 1.4 / slow, slow**-2]),
+        gain=1.0,
+        force=0.005,
+    )
+    y = y[::FINE] + 0.0005 * np.random.default_rng(76).standard_normal(t.size)
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)).pairs[0]
+    assert pair.nonlinear_part is not None
+    assert np.isfinite(pair.nonlinear_part.std)

@@ -211,7 +211,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     """Derivatives of the nonlinear effect by theta, `fit.linear` and its size, (p + 1, n).
 
     Differences over a standard deviation, `scale`, to either side, since samples begin and cease to
-    wait.
+    wait; over less where the model would become unstable or other dynamics.
     """
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
@@ -233,11 +233,24 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
         )
         return np.asarray(fit.nuisance[-1] * one.again(problem, moved).row)
 
-    for i, step in enumerate(scale):
+    for i, step in enumerate(_within_reach(fit, scale)):
+        if not step:
+            continue  # at the edge of the structure
         aside = np.zeros(vector.size)
         aside[i] = step
         out[i] = (effect(vector + aside) - effect(vector - aside)) / (2.0 * step)
     return out
+
+
+def _within_reach(fit: Fit, steps: Real) -> Real:
+    """Steps of theta to either side of which the model is stable and of like dynamics, (p + 1,)."""
+    out, start = steps.copy(), 1
+    for order in fit.structure.sections:
+        out[start] = min(out[start], 1.0)  # a logarithm
+        if order == 2:
+            out[start + 1] = min(out[start + 1], 0.5 * fit.theta[start + 1])
+        start += order
+    return np.asarray(out)
 
 
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
