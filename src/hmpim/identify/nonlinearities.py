@@ -51,7 +51,7 @@ def model_nonlinearity(
     question, fitted = _limit_speed(question, seen, fitted)
     if question.limited is not None:
         return question, fitted
-    return question, _with_with_row(question, seen, fitted)
+    return question, _add_row(question, seen, fitted)
 
 
 def _limit_speed(
@@ -77,7 +77,7 @@ def _limit_speed(
     return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
 
 
-def _with_with_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
+def _add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
     """Add a row for backlash, a dead zone, friction, a spring or a bent scale if it leaves noise.
 
     Not for clipped or held outputs, and not together with a changing gain.
