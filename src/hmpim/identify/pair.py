@@ -245,6 +245,7 @@ def _evidence(
     fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
     # A change of the gain is not reported with a fit that a nonlinearity has replaced.
     gaining = joined.gaining if fit is joined.fits[i].best.fit else None
+    known = question.measured
     evidence = Evidence(
         joint=joint,
         readings=readings,
@@ -258,6 +259,7 @@ def _evidence(
         nonlinear=max((one.share for one in moves if one.certain), default=0.0),
         measured=from_response,
         through=question.instrument is not None,
+        filled=0 if known is None else int(np.count_nonzero(~known)),
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
         limited=question.limited is not None,
         gaining=gaining,

@@ -85,6 +85,7 @@ _ADVICE = {
     "scatter": "Repeat the test under the same conditions.",
     "noise_colour": "Nothing to do: the error bars allow for it.",
     "coloured_noise": "Nothing to do: the error bars allow for it.",
+    "filled_input": "Record without gaps where the input moves.",
     "changing_noise": "Nothing to do: the error bars allow for it.",
     "initial_transient": "Start the record while the unit is at rest.",
     "weak_coupling": "Nothing to do if a coupling this small is expected.",

@@ -9,6 +9,7 @@ import pytest
 from hmpim.identify.judgement.residual import (
     changing_noise,
     coloured_noise,
+    filled_input,
     halves_disagree,
     lack_of_fit,
     noise_colour_of,
@@ -88,6 +89,16 @@ def test_noise_that_is_louder_at_the_end_is_no_colour_and_its_time_is_said(
     low, high = map(float, re.findall(r"from (\S+) to (\S+) times", found.message)[0])
     assert (low, high) == pytest.approx((0.415, 2.08), rel=0.15)  # 1 and 5 over their r.m.s.
     assert "loudest from 9 to 10 s" in found.message or "loudest from 8 to 9 s" in found.message
+
+
+def test_noise_that_varies_where_input_was_filled_in_is_doubted(clean, field_record, evidence_of):
+    _, u, y = field_record
+    level = np.where(np.arange(y.size) < 1600, 1.0, 5.0)
+    evidence = evidence_of(u, y + level * WHITE)
+    assert not [*filled_input(evidence), *filled_input(replace(clean, filled=40))]
+    (found,) = filled_input(replace(evidence, filled=40))
+    assert (found.severity, found.parameters) == ("doubt", ("noise_std",))
+    assert "40 samples" in found.message
 
 
 def test_halves_of_another_delay_cast_doubt(field_record, evidence_of):

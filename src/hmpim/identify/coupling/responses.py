@@ -45,7 +45,7 @@ __all__ = [
 _UPPER = 1.2
 """Standard deviations of |error| that a bound adds: 95 % if the gain is well known, else more."""
 
-_OF_THE_RESIDUAL = frozenset({"lack_of_fit", "unsampled_input", "uneven_noise"})
+_OF_THE_RESIDUAL = frozenset({"lack_of_fit", "unsampled_input", "uneven_noise", "filled_input"})
 """Codes of doubts whether the residual is noise."""
 
 

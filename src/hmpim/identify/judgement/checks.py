@@ -46,6 +46,7 @@ CHECKS: tuple[Check, ...] = (
     residual.noise_colour_of,
     residual.noise_on_the_input,
     residual.uneven_noise,
+    residual.filled_input,
     residual.unsampled_input,
     feedback,
     bandwidth_disagrees,
@@ -70,7 +71,7 @@ SAMPLED: tuple[Check, ...] = (
 _OF_THE_RESIDUAL: tuple[Check, ...] = (
     *(residual.lack_of_fit, residual.coloured_noise, residual.changing_noise),
     *(residual.halves_disagree, residual.noise_colour_of, residual.uneven_noise),
-    *(residual.unsampled_input, feedback, other_order, missed_pole),
+    *(residual.filled_input, residual.unsampled_input, feedback, other_order, missed_pole),
 )
 """The checks of the residual, which are omitted if that is only the error of interpolation."""
 

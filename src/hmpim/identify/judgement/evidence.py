@@ -37,6 +37,7 @@ class Evidence:
     nonlinear: float = 0.0  # share of the residual's power that is known to be nonlinear
     held: bool = False  # whether the output is held, so that its measured response shows the hold
     through: bool = False  # whether the pair was identified through a loop's reference
+    filled: int = 0  # samples at which an input was not measured, and was filled in
     jittered: bool = False  # whether the stamps are uneven, so that samples are interpolated
     limited: bool = False  # whether the input is the command as a unit of limited speed follows it
     gaining: GainChange | None = None  # a gain that changes along the record, if there is evidence

@@ -21,6 +21,7 @@ from hmpim.record import Finding
 __all__ = [
     "changing_noise",
     "coloured_noise",
+    "filled_input",
     "folded_power",
     "halves_disagree",
     "lack_of_fit",
@@ -128,6 +129,25 @@ def changing_noise(evidence: Evidence) -> Iterator[Finding]:
         f"{first:.3g} to {last:.3g} s after its first sample. The error bars allow for it.",
         severity="info",
         parameters=MODELLED,
+    )
+
+
+def filled_input(evidence: Evidence) -> Iterator[Finding]:
+    """Doubt the noise if it varies with time where samples of the input were filled in.
+
+    Samples that depend on filled-in input count where few others would be left. Its errors enter
+    the residual, and are large where the input moves fast.
+    """
+    noise = evidence.joint.weighed.as_loud(evidence.readings.innovations)
+    if not evidence.filled or is_steady(noise):
+        return
+    yield Finding(
+        code="filled_input",
+        message=f"{evidence.filled} samples of the input were filled in, and the noise is louder "
+        "at some times than at others: errors of the filled-in input may be part of it. Record "
+        "without gaps.",
+        severity="doubt",
+        parameters=("noise_std",),
     )
 
 
