@@ -12,6 +12,8 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.kept import kept
+from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
@@ -66,7 +68,38 @@ def chances_without_feedback(u: Real, residuals: Real, counts: Mask | None = Non
 
     The residuals, (k, n), are of outputs to the input, (n,); all samples count, or those of
     `counts`. The chance is 1 if the input's past determines its future.
+
+    Products of lags decide that there is none. They lose half of the digits, where the future of a
+    smooth input differs little from what its past predicts, and take the residual for white: what
+    they find is computed again from the samples.
     """
+    chances = _by_products(u, residuals, counts)
+    for k in np.flatnonzero(chances < FALSE_ALARM):
+        chances[k] = _by_samples(u, residuals[k], counts)
+    return chances
+
+
+def _by_samples(u: Real, residual: Real, counts: Mask | None) -> float:
+    """The chance by orthogonal projections of the samples, for a residual of any colour."""
+    moves = u - u.mean()
+    lags = np.lib.stride_tricks.sliding_window_view(moves, moves.size - 2 * _AHEAD)
+    rows, inner = np.concatenate([np.ones((1, lags.shape[1])), lags]), residual[_AHEAD:-_AHEAD]
+    counted = np.ones(inner.size, dtype=bool) if counts is None else counts[_AHEAD:-_AHEAD]
+    rows, inner = rows * counted, np.where(counted, inner - inner[counted].mean(), 0.0)
+    past = np.linalg.qr(rows[_PAST].T)[0].T
+    future = rows[_FUTURE] - (rows[_FUTURE] @ past.T) @ past
+    size, direction = _distinct(future @ future.T, float(np.sum(rows[1:] ** 2)))
+    if not size.size:
+        return 1.0
+    own = direction.T @ future
+    freedom = max(int(np.count_nonzero(counted)) - len(past) - size.size, 1)
+    errors = covariance(own, inner, freedom=freedom, white=is_white(inner[counted]))
+    found = (own @ inner) / size
+    return float(scipy.special.chdtrc(size.size, found @ np.linalg.solve(errors, found)))
+
+
+def _by_products(u: Real, residuals: Real, counts: Mask | None) -> Real:
+    """The chances by the products of lags, of which the input's are computed once."""
     lost = np.flatnonzero([] if counts is None else ~counts[_AHEAD:-_AHEAD])
     size, direction, predicted = _future_of(u, lost)
     if not size.size or not residuals.shape[0]:
@@ -86,6 +119,13 @@ def chances_without_feedback(u: Real, residuals: Real, counts: Mask | None = Non
     return np.asarray(scipy.special.chdtrc(size.size, explained))
 
 
+def _distinct(products: Real, power: float) -> tuple[Real, Real]:
+    """Eigenvalues and vectors of a future's unpredicted part that the arithmetic resolves."""
+    size, direction = np.linalg.eigh(products)
+    distinct = size > 1e-9 * power
+    return size[distinct], direction[:, distinct]
+
+
 @kept
 def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
     """Eigenvalues and vectors of the unpredicted part of the future, and the predictor."""
@@ -97,9 +137,8 @@ def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
         gram -= rows @ rows.T
     # The Schur complement is the part of the future that the past does not predict.
     predicted = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
-    size, direction = np.linalg.eigh(gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ predicted)
-    distinct = size > 1e-9 * float(np.trace(gram) - gram[0, 0])
-    return size[distinct], direction[:, distinct], predicted
+    unpredicted = gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ predicted
+    return *_distinct(unpredicted, float(np.trace(gram) - gram[0, 0])), predicted
 
 
 def _gram(u: Real) -> Real:
