@@ -20,7 +20,7 @@ ROWS = {
     ]
     for name, text, start in (
         ("method", DOCS["method"], "## Verdict and warnings"),
-        ("rigs", DOCS["rigs"], "What the run says stands"),
+        ("rigs", DOCS["rigs"], "A run adds these findings"),
         ("formats", DOCS["formats"], "It stands in the record"),
     )
 }
