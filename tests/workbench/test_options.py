@@ -9,7 +9,7 @@ from hmpim.cli.main import app
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["--port", "70000"], "--port 70000 is no port"),
+        (["--port", "70000"], "--port 70000 is not a port"),
         (["--max-upload", "0"], "--max-upload 0 MB takes nothing"),
         (["--grace", "0"], "--grace 0 s"),
         (["--rig-file", "nowhere.toml"], "'nowhere.toml' cannot be read"),

@@ -212,7 +212,7 @@ def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, window)
     record = hmpim.load(folder / "run.h5")
     assert record.duration < 300.0
     assert any("is gone" in f.message for f in record.findings)
-    assert "was told to stop" in (folder / "run.log").read_text()
+    assert "was commanded to stop" in (folder / "run.log").read_text()
     page.get_by_text("Not armed").wait_for()
 
 

@@ -163,7 +163,7 @@ def batch(
     for name in by or ():
         if name not in table.metadata:
             known = ", ".join(table.metadata) or "none"
-            raise ArgumentError(f"--by {name!r} is no column of metadata; those are {known}")
+            raise ArgumentError(f"--by {name!r} is not a column of metadata; those are {known}")
     outcomes = write_study(table, page, bounds=bounds, by=by or ())
     if not quiet:
         _print(table)

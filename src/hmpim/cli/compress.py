@@ -201,7 +201,7 @@ def _join(
     except ArgumentError as error:
         here, there = files
         raise ArgumentError(
-            f"{here} (here) and {there} (there) do not go together: {error}"
+            f"{here} (here) and {there} (there) cannot be combined: {error}"
         ) from None
 
 

@@ -297,7 +297,8 @@ def _joined(
     """Records as the runs of one fit, of the input and the output that are named, if any."""
     if len(given) < 2:
         raise ArgumentError(
-            "--together fits several records as one, and one is given; leave it out, or give more"
+            "--together fits several records as one, but only one is given; leave it out, "
+            "or give more"
         )
     _check_single(len(given), {name: options[name] for name in ("--reference", "--holdout")})
     joined = runs_of(given, named)
@@ -329,7 +330,7 @@ def _by_hand(given: Sequence[str]) -> dict[str, float]:
             values[name.strip()] = float(value)
         except ValueError:
             raise ArgumentError(
-                f"--hand {text!r} is no NAME=VALUE; write bandwidth_phase90=33"
+                f"--hand {text!r} is not NAME=VALUE; write bandwidth_phase90=33"
             ) from None
     return values
 
@@ -339,7 +340,7 @@ def _check_single(count: int, options: Mapping[str, object]) -> None:
     for option, wanted in options.items():
         if count > 1 and wanted is not None:
             raise ArgumentError(
-                f"{option} is about one record, and {count} are given; leave it out, or give one"
+                f"{option} applies to one record, but {count} are given; leave it out, or give one"
             )
 
 

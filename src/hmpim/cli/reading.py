@@ -152,7 +152,9 @@ def seconds(text: str, option: str) -> float:
             raise ValueError(text)
         return float(match["number"]) * conversion_factor(match["unit"] or "s", to="s")
     except (ValueError, UnitError):
-        raise ArgumentError(f"{option}: {text!r} is no time; write it as 3.2ms or 0.0032") from None
+        raise ArgumentError(
+            f"{option}: {text!r} is not a time; write it as 3.2ms or 0.0032"
+        ) from None
 
 
 def units_of(given: Sequence[str] | None) -> dict[str, str]:

@@ -302,6 +302,6 @@ def _check_kept(output: Path | None, *, json: Path | None, report: Path | None) 
     if json is not None and json.suffix.lower() != ".json":
         raise ArgumentError(f"--json {json} must end in .json")
     if output is None and json is None and report is None:
-        raise ArgumentError("nothing would be kept of the run; name a file with -o")
+        raise ArgumentError("the run would not be saved; name a file with -o")
     if output is not None and output.suffix.lower() not in suffixes_of(Record):
         raise ArgumentError(f"-o {output} must end in one of {', '.join(suffixes_of(Record))}")

@@ -148,7 +148,7 @@ def _less(share: float, why: str) -> Felt:
         findings=(
             Finding(
                 code="felt",
-                message=f"Played at {100 * share:.3g} % of the amplitude asked for: {why}.",
+                message=f"Played at {100 * share:.3g} % of the requested amplitude: {why}.",
                 severity="info",
                 parameters=(),
             ),

@@ -70,7 +70,7 @@ def run(
     ------
     LimitsError
         If a true peak of the stimulus, between samples too, is beyond a limit of the rig, or
-        the rig moves and states none; the message says what would do.
+        the rig moves and states none; the message says what is enough.
     UnitError
         If the units of stimulus and limits cannot be compared.
     RigError
@@ -120,7 +120,8 @@ def _mapped(
         return stimulus
     if not isinstance(stimulus, Sequence) or not all(isinstance(s, Stimulus) for s in stimulus):
         raise ArgumentError(
-            f"{shown(stimulus)} is no Stimulus; make one with design(...) or Stimulus(waveform=...)"
+            f"{shown(stimulus)} is not a Stimulus; make one with design(...) or "
+            "Stimulus(waveform=...)"
         )
     axes = [s.axis for s in stimulus]
     if len(set(axes)) < len(axes) or (len(axes) > 1 and not all(axes)):

@@ -77,7 +77,7 @@ class Until:
 
     def __post_init__(self) -> None:
         if not self.targets:
-            raise ArgumentError(f"nothing is asked for; give one of {', '.join(TARGETS)}")
+            raise ArgumentError(f"no target is given; give one of {', '.join(TARGETS)}")
         for name, value in (*self.targets.items(), ("every", self.every)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ArgumentError(f"{name} = {value!r} must be a positive, finite number")
@@ -86,7 +86,9 @@ class Until:
         object.__setattr__(self, "relative", tuple(self.relative))
         for name in self.relative:
             if name not in self.targets:
-                raise ArgumentError(f"relative = {name!r} is no target; those are {self._names()}")
+                raise ArgumentError(
+                    f"relative = {name!r} is not a target; those are {self._names()}"
+                )
 
     def __str__(self) -> str:
         return ",".join(
@@ -154,7 +156,8 @@ def until_of(text: str, *, pair: tuple[str, str] | None = None) -> Until:
         found = _PART.fullmatch(part)
         if found is None:
             raise ArgumentError(
-                f"--until {part!r} is no target; write one as delay=0.4ms or natural_frequency=1%"
+                f"--until {part!r} is not a target; write one as delay=0.4ms or "
+                "natural_frequency=1%"
             )
         name, number, unit = found.groups()
         if name not in TARGETS:
@@ -164,7 +167,7 @@ def until_of(text: str, *, pair: tuple[str, str] | None = None) -> Until:
         try:
             value = float(number)
         except ValueError:
-            raise ArgumentError(f"--until {part!r}: {number!r} is no number") from None
+            raise ArgumentError(f"--until {part!r}: {number!r} is not a number") from None
         if unit == "%":
             relative.append(name)
             asked[name] = value / 100.0

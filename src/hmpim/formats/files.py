@@ -99,7 +99,7 @@ def read(
         motions = _motions(runs)
         if not 1 <= options.sweep <= len(motions):
             raise ArgumentError(
-                f"sweep {options.sweep} is asked for, and {Path(path).name!r} has "
+                f"there is no sweep {options.sweep}: {Path(path).name!r} has "
                 f"{_told([m for _, m in motions])}"
             )
         run, motion = motions[options.sweep - 1]
@@ -107,7 +107,7 @@ def read(
     if len(runs) > 1:
         motions = _motions(runs)
         raise RecordError(
-            f"time starts again in {Path(path).name!r}: it holds {len(runs)} recordings with "
+            f"time starts again in {Path(path).name!r}: the file holds {len(runs)} recordings with "
             f"{_told([m for _, m in motions])}; choose one with --sweep N, or all with --sweep all"
         )
     return runs[0] if ours else _with_motions_said(runs[0])

@@ -421,7 +421,8 @@ def _refuse_cut(path: Path, rows: Sequence[str], comment: str) -> None:
     samples = len(rows) - 1 if stated is None else int(stated[1])
     if not len(whole) == len(rows) - 1 == samples:
         raise FormatError(
-            f"{str(path)!r} is damaged: {len(whole)} of its {samples} samples are whole; copy it "
+            f"{str(path)!r} is damaged: {len(whole)} of its {samples} samples are "
+            "complete; copy it "
             "again, or save the stimulus anew"
         )
 

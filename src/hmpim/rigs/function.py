@@ -148,7 +148,7 @@ class FunctionRig(Simulated):
         if bad.size:
             raise RigError(
                 f"{self.name!r} returned {values[bad[0]]} at sample {first + bad[0]}, for the "
-                f"input {fed[bad[0]]:.6g} ({bad.size} such in all); make it return finite numbers"
+                f"input {fed[bad[0]]:.6g} ({bad.size} in all); make it return finite numbers"
             )
         return values
 
@@ -156,5 +156,5 @@ class FunctionRig(Simulated):
 def _real(answer: Any) -> Any:
     """Return the answer; numpy would take None for nan, and drop an imaginary part."""
     if answer is None or isinstance(answer, complex):
-        raise TypeError(f"it returned {answer!r}, which is no real number")
+        raise TypeError(f"it returned {answer!r}, which is not a real number")
     return answer

@@ -212,7 +212,7 @@ def export(
             )
     if not isinstance(result, Identification):
         raise ArgumentError(
-            f"{type(result).__name__} is no result; give what hmpim.identify returned, or what "
+            f"{type(result).__name__} is not a result; give what hmpim.identify returned or what "
             "was read back from its JSON"
         )
     place = Path(path)

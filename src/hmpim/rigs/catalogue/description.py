@@ -194,4 +194,4 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         raise FormatError(f"{str(path)!r} cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
-        raise FormatError(f"{str(path)!r} is no TOML: {error}") from error
+        raise FormatError(f"{str(path)!r} is not valid TOML: {error}") from error

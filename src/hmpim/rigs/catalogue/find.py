@@ -80,7 +80,7 @@ def find_rig(
         described = description
         if text and described.rig and text != described.rig:
             raise FormatError(
-                f"the rig file is about {described.rig!r}, and {text!r} is asked for; "
+                f"the rig file describes {described.rig!r}, but the command names {text!r}; "
                 "leave one of them out"
             )
         text = text or described.rig

@@ -210,7 +210,7 @@ def unpack(data: bytes) -> Datagram:
     try:
         kind = Kind(number_of_kind)
     except ValueError:
-        raise RigError(f"a datagram of kind {number_of_kind}, which nobody knows") from None
+        raise RigError(f"a datagram of kind {number_of_kind}, which is not known") from None
     body = data[_HEAD.size :]
     command = response = None
     text = ""
@@ -246,7 +246,7 @@ def _response(body: bytes, axes: int) -> Response:
     try:
         known = State(state)
     except ValueError:
-        raise RigError(f"a response with state {state}, which nobody knows") from None
+        raise RigError(f"a response with state {state}, which is not known") from None
     position, measured = _columns(body, 2, offset=_RESPONSE.size)
     return Response(
         in_force=in_force,
