@@ -164,7 +164,7 @@ def test_five_axes_run_once_every_light_is_green(page, served):
     page.get_by_role("link", name="To the run").click()
     page.get_by_role("button", name="Arm", exact=True).click()
     page.get_by_role("button", name="Start").click()
-    page.get_by_text("Played to its end").wait_for()
+    page.get_by_text("Played to the end").wait_for()
     assert page.locator(".hm-strip canvas").count() == 5
     (path,) = kept(served, "table")
     record = hmpim.load(path)

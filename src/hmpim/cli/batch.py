@@ -74,7 +74,7 @@ def batch(
             "--pool-by",
             metavar="NAME",
             help="Identify the records that share this column of metadata as one, such as a "
-            "unit's serial number; all: one model of all. Samples stay where they are.",
+            "unit's serial number; all: one model for all records. Samples are not copied.",
         ),
     ] = "",
     lags: Annotated[
@@ -116,7 +116,7 @@ def batch(
         bool,
         typer.Option(
             "--resume/--fresh",
-            help="Continue where an earlier run of the same batch stopped, or start anew.",
+            help="Continue where an earlier run of the same batch stopped, or start afresh.",
         ),
     ] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,

@@ -104,8 +104,8 @@ def identify(
         bool,
         typer.Option(
             "--together",
-            help="Fit one model to all records, each a run of its own with its own bias and "
-            "beginning, instead of averaging or comparing them.",
+            help="Fit one model to all records, each with its own bias and initial state, "
+            "instead of averaging or comparing them.",
         ),
     ] = False,
     intersample: Annotated[
@@ -128,9 +128,9 @@ def identify(
         Kept,
         typer.Option(
             "--nonlinear",
-            help="What becomes of backlash, a dead zone, friction or a spring. modelled: part of "
-            "the model, with the linear part's figures; reported: named only, with the figures of "
-            "the best linear model at this amplitude.",
+            help="How to treat backlash, a dead zone, friction or a spring. modelled: include it "
+            "in the model and give the linear part's figures; reported: only name it and give the "
+            "figures of the best linear model at this amplitude.",
         ),
     ] = Kept.MODELLED,
     holdout: Annotated[
@@ -152,7 +152,7 @@ def identify(
     structure: Annotated[
         list[str] | None,
         typer.Option(
-            "--structure", metavar="NAME", help="Try this structure alone; may be repeated."
+            "--structure", metavar="NAME", help="Fit only this structure; may be repeated."
         ),
     ] = None,
     hand: Annotated[
@@ -184,7 +184,7 @@ def identify(
     """Find every parameter of a measured record, each with its error bar.
 
     Several records of one test are averaged, and their scatter is compared with the stated errors;
-    records at several amplitudes show where the unit is linear. With --together all are one fit.
+    records at several amplitudes show where the unit is linear. --together fits all as one.
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},

@@ -28,7 +28,7 @@ def paper(
     ] = None,
     more: Annotated[list[str] | None, typer.Argument(metavar="[NUMBER]...", hidden=True)] = None,
 ) -> None:
-    """Make the paper's figures again, and a table of its printed values next to ours.
+    """Reproduce the paper's figures, and a table of its printed values next to ours.
 
     Writes each figure as PNG and SVG, the table as table.md and table.json, and index.html
     with all of it.

@@ -61,8 +61,8 @@ def run(
             "-o",
             "--output",
             metavar="FILE",
-            help="File for the record, written during the run; a kill leaves an .h5 file as it is, "
-            "and of others FILE.partial.h5.",
+            help="File for the record, written during the run. After a kill, the samples are in "
+            "this file if it is .h5, otherwise in FILE.partial.h5.",
         ),
     ] = None,
     until: Annotated[

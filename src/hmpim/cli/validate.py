@@ -69,7 +69,7 @@ def validate(
     to: To = None,
     sweep: Annotated[
         int | None,
-        typer.Option("--sweep", metavar="N", help="Take this sweep of several in a log."),
+        typer.Option("--sweep", metavar="N", help="Use this one of several sweeps in a log."),
     ] = None,
     stamps: StampChoice = Stamps.AUTO,
     sheet: Sheet = None,
