@@ -36,7 +36,7 @@ def check_rig(rig: object) -> Rig:
     --------
     >>> check_rig(abs)
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: <built-in function abs> is no rig: it has no name, ...
+    hmpim.errors.ArgumentError: <built-in function abs> is not a rig: it has no name, ...
     """
     if isinstance(rig, Rig) and not isinstance(rig, type):
         return rig

@@ -21,7 +21,7 @@ TARGETS = {
     "scale_factor": "",
     "bias": "",
 }
-"""What may be asked for, and its unit; that of scale factor and bias is the channels' own."""
+"""Parameters that may have a target, and their units; scale factor and bias: the channels' own."""
 
 _OWN = ("scale_factor", "bias")
 _LOOKS = 3  # in a row at which the rule must hold: study in docs/live.md
@@ -33,8 +33,9 @@ _EVERY = 0.05  # s between two looks
 class Until:
     """End a run as soon as these are known: each target is a standard deviation.
 
-    A run never ends before the whole band was passed once and answered, while one of these is
-    doubtful, or before the rule holds at several looks in a row.
+    A run never ends before the stimulus has covered the whole band once and the output has
+    responded, while one of these figures is doubtful, or before the rule holds at several looks
+    in a row.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ class Until:
     natural_frequency : float, optional
         In Hz.
     damping_ratio, scale_factor, bias : float, optional
-        In the channels' own unit, where there is one.
+        In the channels' own unit, if they have one.
     relative : tuple of str
         Names of the targets that are shares of the estimate, 0.01 being 1 %.
     looks : int
@@ -51,12 +52,12 @@ class Until:
     every : float
         Seconds between two looks.
     pair : (str, str), optional
-        Names of output and input, as in ``result["y", "u"]``; needed where there are several.
+        Names of output and input, as in ``result["y", "u"]``; needed if there are several.
 
     Raises
     ------
     ArgumentError
-        If nothing is asked for, or a number is out of range.
+        If no target is given, or a number is out of range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place, then moved into it.
+"""Files that are complete or absent: written to a temporary file, then moved into place.
 
 Every file that hmpim writes goes through `replacing`. The one exception is the record of a
 running test, which grows as it comes (`hmpim.formats.recording`). A process that is killed, or a

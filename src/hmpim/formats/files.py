@@ -52,12 +52,12 @@ def read(
         Name of the time channel. Without: time or t, in any case. In seconds unless its heading
         says otherwise, as ``time [ms]``.
     units : mapping of str to str, optional
-        Unit by channel name; goes before that of the file.
+        Unit by channel name; overrides that of the file.
     references, auxiliary : sequence of str, optional
-        Names of the channels that say what a loop was asked, and of those that are kept beside
-        and never fitted. Without: those that the file states.
+        Names of the channels that hold the command of a loop, and of those that are kept but
+        never fitted. Without: those that the file states.
     options : ReadOptions, optional
-        The part that is wanted, clocks that are off, files beside, and the like.
+        Part of the file to read, offsets of clocks, further files of the same test, and more.
 
     Returns
     -------

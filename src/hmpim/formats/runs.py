@@ -181,7 +181,7 @@ def filter_runs(runs: Sequence[Run], conditions: Sequence[str]) -> tuple[Run, ..
     >>> filter_runs([], ["speed > 3"])
     Traceback (most recent call last):
     ...
-    hmpim.errors.ArgumentError: 'speed > 3' asks for 'speed', which no run has; choose one of \
+    hmpim.errors.ArgumentError: 'speed > 3' uses 'speed', which no run has; choose one of \
 name, source, rig, input, output, verdict, created, fs, duration, samples, delay, ...
     """
     tests = [_condition(text) for text in conditions]

@@ -223,7 +223,7 @@ def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
 
 
 def read_stimulus(path: str | PathLike[str]) -> list[Stimulus] | list[PlayedStimulus]:
-    """Read stimuli back: whole ones from TOML, samples from CSV, HDF5, MAT or a C header.
+    """Read stimuli back: complete ones from TOML, samples from CSV, HDF5, MAT or a C header.
 
     Parameters
     ----------

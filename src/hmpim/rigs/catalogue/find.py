@@ -1,4 +1,4 @@
-"""From what stands on the command line to a rig: a name, a kind, or an address."""
+"""Find the rig that the command line names: by name, kind or address."""
 
 import re
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ class FoundRig:
 
     @property
     def limits(self) -> LimitsOfAxes:
-        """Limits that the description states; to be kept beside the rig's own."""
+        """Limits that the description states, in addition to the rig's own."""
         return self.description.stated_limits()
 
 

@@ -1,4 +1,4 @@
-"""A tracker under test: the line of sight is moved, and what the tracker says is recorded."""
+"""A tracker under test: the stimulus moves the line of sight, the tracker's output is recorded."""
 
 import math
 from collections.abc import Callable
