@@ -21,7 +21,7 @@ ROWS = {
     for name, text, start in (
         ("method", DOCS["method"], "## Verdict and warnings"),
         ("rigs", DOCS["rigs"], "A run adds these findings"),
-        ("formats", DOCS["formats"], "It stands in the record"),
+        ("formats", DOCS["formats"], "Whatever is missing from a file"),
     )
 }
 ELSEWHERE = {
