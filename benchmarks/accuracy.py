@@ -144,8 +144,8 @@ def at_the_bound(count: int, mapped: Callable) -> list[str]:
     ok = 100 * np.mean([o.verdict == "ok" for o in outcomes])
     lines += [
         "",
-        f"{count} seeds. Noise found: {sigma:.5f} on average for 0.1 "
-        f"(one record's own bound is 1.6 %). Verdict `ok`: {ok:.1f} %.",
+        f"{count} seeds. Noise found: {sigma:.5f} on average; the truth is 0.1 "
+        f"(the bound for one record is 1.6 %). Verdict `ok`: {ok:.1f} %.",
     ]
     return lines
 
@@ -160,7 +160,12 @@ def coloured(count: int, mapped: Callable) -> list[str]:
         outcomes = mapped(partial(one_field, kind), range(count), kind)
         held = [100 * np.mean([o.inside.get(name, False) for o in outcomes]) for name in TRUTH]
         lines.append(f"| {kind} | " + " | ".join(f"{h:.1f} %" for h in held) + " |")
-    return [*lines, "", f"Share of {count} intervals each that hold the truth; 95 % is stated."]
+    return [
+        *lines,
+        "",
+        f"Share of {count} intervals that contain the truth, for each parameter; the nominal "
+        "share is 95 %.",
+    ]
 
 
 # --- what a sensor does to its signal (Fig. 1) ----------------------------------------------------
@@ -250,11 +255,11 @@ def sensor_effects(count: int, mapped: Callable) -> list[str]:
     return [
         *lines,
         "",
-        "field.md's sensor with noise 0.05. Mean error in its own standard deviations (0 is "
-        f"without bias), and the share of {count} stated 95 % intervals that hold the truth. With "
-        "a drift the bias is its mean over the record. Noise on the input counts as noise of the "
-        "output, where the response passes it on; so does a bias that wanders at random, where "
-        "its spectrum describes it better than a polynomial.",
+        "The sensor of field.md with noise 0.05. The table gives the mean error in stated standard "
+        f"deviations (0 is unbiased), and the share of {count} stated 95 % intervals that contain "
+        "the truth. With a drift, the bias is the mean over the record. Noise on the input appears "
+        "as noise of the output, as far as the response transmits it. So does a bias that wanders "
+        "at random, if its spectrum describes it better than a polynomial.",
     ]
 
 
@@ -325,15 +330,15 @@ def random_systems(count: int, mapped: Callable) -> list[str]:
     named = 100 * np.mean([d.right_structure for d in draws])
     ok = 100 * np.mean([d.verdict == "ok" for d in draws])
     return [
-        f"Of {count} random systems {count - len(far)} ({100 * (1 - len(far) / count):.2f} %) end "
+        f"Of {count} random systems, {count - len(far)} ({100 * (1 - len(far) / count):.2f} %) are "
         f"within 5 standard deviations of the truth in every parameter. Of the other {len(far)}, "
-        f"{len(silent)} carry the verdict `ok`. The structure is named rightly in {named:.1f} %; "
+        f"{len(silent)} have the verdict `ok`. The structure is right in {named:.1f} %; "
         f"{ok:.1f} % of all verdicts are `ok`.",
         "",
         "First and second order; delay 0 to 0.3 s; natural frequency 10 to 80 % of the swept band; "
         "damping 0.1 to 1.5; scale 0.3 to 3, either sign; bias; noise 0.05 to 5 % of the "
-        "amplitude; 100 to 1000 Hz; 5 or 10 s; n from 0 to 1.1. Where the "
-        "structure is not the true one, delay, scale factor and bias are compared.",
+        "amplitude; 100 to 1000 Hz; 5 or 10 s; n from 0 to 1.1. If the structure "
+        "found is not the true one, only delay, scale factor and bias are compared.",
     ]
 
 
@@ -355,8 +360,8 @@ def one_response(seed: int) -> float:
 def frequency_response(count: int, mapped: Callable) -> list[str]:
     errors = 100 * np.array(mapped(one_response, range(count), "frequency response"))
     return [
-        "Median complex error over 0.5 to 20 Hz, relative, no delay given: "
-        f"{np.median(errors):.2f} % in the middle of {count} seeds, "
+        "Median relative complex error over 0.5 to 20 Hz, no delay given: "
+        f"{np.median(errors):.2f} % in the median of {count} seeds, "
         f"{np.percentile(errors, 95):.2f} % in the 95th percentile, {errors.max():.2f} % at "
         f"worst; {100 * np.mean(errors <= 2):.1f} % of the seeds are at 2 % or below."
     ]
@@ -478,9 +483,9 @@ def field_row(seed: int = 0) -> list[str]:
         "| sysidentpy, nfoursid, python-control ERA | lags, delay | 160 / given | none or wrong "
         "| – | 0.01–0.3 s |",
         "",
-        "Our row is from this run, of a record of the same kind (seed 0, white noise 0.1), and its "
-        "delay allows for each assumption between the samples; the others' were measured "
-        "elsewhere, on their own record of it and their own machine.",
+        "Our row is from this run, with a record of the same kind (seed 0, white noise 0.1); the "
+        "error of its delay allows for each assumption between the samples. The other rows were "
+        "measured elsewhere, with another record of this kind and on another computer.",
     ]
 
 
@@ -560,9 +565,10 @@ def put(page: str, title: str, body: str) -> str:
 
 HEAD = """# Accuracy
 
-`make accuracy` makes this page from scratch; every figure is from that run. field.md's record:
-second order 10 Hz, ζ 0.4, delay 150 ms, bias 0.6, white noise 0.1, linear chirp 0.1 to 20 Hz of
-amplitude 1, 10 s at 200 Hz. `hmpim.identify` is given the samples and the rate.
+`make accuracy` recomputes the tables of this page; the text says where a figure has another source.
+"field.md's record" is a second-order system with 10 Hz, ζ 0.4, delay 150 ms, bias 0.6 and white
+noise 0.1. Its input is a linear chirp from 0.1 to 20 Hz of amplitude 1, for 10 s at 200 Hz.
+`hmpim.identify` is given the samples and the rate, nothing else.
 """
 
 

@@ -143,9 +143,10 @@ def section(count: int, mapped: Callable) -> list[str]:
         "",
         f"{count} records of 10 s at 500 Hz: five second-order axes and {len(COUPLED)} couplings "
         f"of 1 to 5 % with dynamics and delay of their own, noise {NOISE} on travels of ±4. "
-        f"Of {real} couplings {sum(t.missed for t in tests)} were missed; of {none} pairs that are "
-        f"not coupled {sum(t.invented for t in tests)} were called so. "
-        f"Median time of one record's 25 pairs: {np.median([t.seconds for t in tests]):.1f} s.",
+        f"Of {real} couplings, {sum(t.missed for t in tests)} were missed; of {none} pairs "
+        f"without a coupling, {sum(t.invented for t in tests)} were called coupled. "
+        "Median time for the 25 pairs of one record: "
+        f"{np.median([t.seconds for t in tests]):.1f} s.",
     ]
 
 
@@ -195,6 +196,6 @@ def repeats(count: int, mapped: Callable) -> list[str]:
         "| --- | --- | --- |",
         *(f"| `{n}` | {share(right, n):.1f} % | {share(wrong, n):.0f} % |" for n in TOLD),
         "",
-        f"Four repeats each, {count} times (and {len(wrong)}): first-order lag, noise 0.05. The "
-        "chi-squared test of `identify_repeats`, at the level of 5 %.",
+        f"Four repeats of a first-order lag with noise 0.05, {count} times (and {len(wrong)}). The "
+        "chi-squared test is that of `identify_repeats`, at the level of 5 %.",
     ]

@@ -65,19 +65,20 @@ def timing() -> list[str]:
     right = re.search(r"([\d.]+) % of the periods", told)
     missed = re.search(r"(\d+) of (\d+) commands were a period or more late", told)
     if not (off and right and missed):
-        raise SystemExit(f"the run does not tell its timing: {told!r}")
+        raise SystemExit(f"the run does not state its timing: {told!r}")
     scheduling = re.search(r"(real-time|ordinary) scheduling[^\n]*", log)
     away, noticed = unlike(record, sweep)
     share = float(right[1])
     return [
-        f"| {RATE:g} commands a second, one axis, {record.duration:.1f} s | | asked for |",
+        f"| {RATE:g} commands a second, one axis, {record.duration:.1f} s | | goal |",
         "| --- | --- | --- |",
-        f"| off their time: median, 99.9 %, worst | {off[1]} ms, {off[2]} ms, {off[3]} ms | |",
+        f"| error of their times: median, 99.9 %, worst "
+        f"| {off[1]} ms, {off[2]} ms, {off[3]} ms | |",
         f"| periods right to half a period | {share:g} % | {verdict(share >= 98)}: 98 % |",
         f"| a period or more late | {missed[1]} of {missed[2]} | |",
         f"| ticks without their command or sample | {away} | |",
         f"| of these noticed and counted | {noticed} | {verdict(away == noticed)}: all |",
-        f"| scheduling | {scheduling[0] if scheduling else 'not told'} | |",
+        f"| scheduling | {scheduling[0] if scheduling else 'not known'} | |",
     ]
 
 
@@ -163,7 +164,7 @@ def updates() -> list[str]:
     return [
         "| ms | "
         + " | ".join(f"{fs:g} Hz, {seconds:g} s" for (fs, seconds), *_ in runs)
-        + " | asked for |",
+        + " | goal |",
         "| --- |" + " --- |" * (len(runs) + 1),
         _row("ordinary update: median", [np.median(run[1]) for run in runs]),
         _row("99 %", [np.quantile(run[1], 0.99) for run in runs], f"{verdict(slowest <= 5)}: 5"),
@@ -172,7 +173,7 @@ def updates() -> list[str]:
         _row("median of the last quarter", [np.median(_part(run[1], 3)) for run in runs]),
         _row("new start: longest", [run[2].max() for run in runs]),
         _row("new starts", [run[2].size for run in runs], shape="d"),
-        _row("kept of the run, kB", [run[3] / 1e3 for run in runs], shape=".0f"),
+        _row("data kept of the run, kB", [run[3] / 1e3 for run in runs], shape=".0f"),
     ]
 
 

@@ -195,11 +195,11 @@ def detections(count: int, mapped: Callable) -> list[str]:
     return [
         *lines,
         "",
-        f"{count} seeds each; second order 10 Hz, ζ 0.4, delay 30 ms, stepped in time at 16 times "
-        "the rate; the paper's sweep 0.1 to 20 Hz, n = 1. Sizes: the band of friction, and half "
-        "the play, over the amplitude; the speed limit over the fastest motion; the cubic force "
-        "over the linear one at the amplitude. Noise over the amplitude. A kind that is part of "
-        "the model counts as named.",
+        f"{count} seeds each; second order with 10 Hz, ζ 0.4 and a delay of 30 ms, integrated at "
+        "16 times the sampling rate; the paper's sweep from 0.1 to 20 Hz, n = 1. Sizes are ratios: "
+        "the friction band, or half the play, to the amplitude; the speed limit to the fastest "
+        "motion; the cubic force to the linear one at the amplitude. Noise is relative to the "
+        "amplitude. A kind that is part of the model counts as named.",
     ]
 
 

@@ -307,13 +307,13 @@ def test_names_that_the_table_lacks_refuse_nonsense_too():
         ),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs=1.0, band=(5, 1)),
-            "band = (5, 1) Hz is no band; give the lower frequency first, such as (0.1, 20)",
+            "band = (5, 1) Hz is not a band; give the lower frequency first, such as (0.1, 20)",
         ),
         (lambda: hmpim.Record.from_arrays([0, 1j], [1, 2], fs=1.0), "channel 'u' is complex"),
         (lambda: hmpim.paper_analysis(np.ones(9) * 1j, np.ones(9), 1.0), "u is complex"),
         (lambda: hmpim.design(band=(1, 5), duration=1e9, fs=20, limits=LIMITS), "2e+10 samples"),
         (lambda: hmpim.design(band=(1, 5), duration=9, fs=1e12, limits=LIMITS), "9e+12 samples"),
-        (lambda: hmpim.run(hmpim.Sensor(), STIMULUS, rng=-1), "rng = -1 is no seed"),
+        (lambda: hmpim.run(hmpim.Sensor(), STIMULUS, rng=-1), "rng = -1 is not a seed"),
     ],
 )
 def test_what_is_said(call, words):
@@ -372,7 +372,7 @@ def test_sizes_seeds_and_numbers():
     assert size_of(0.1, 100.0) == 10
     with pytest.raises(ArgumentError, match=r"1e\+08 samples are made at once"):
         size_of(math.inf, 1.0)
-    with pytest.raises(ArgumentError, match=r"rng = 1\.5 is no seed"):
+    with pytest.raises(ArgumentError, match=r"rng = 1\.5 is not a seed"):
         generator(1.5)
     with pytest.raises(ArgumentError, match="u holds nan at place 1"):
         numbers_of("u", [0.0, math.nan])

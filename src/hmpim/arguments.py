@@ -270,7 +270,7 @@ def generator(rng: np.random.Generator | int | None) -> np.random.Generator:
     if isinstance(rng, np.random.Generator):
         return rng
     if rng is not None and (not fits(rng, int) or rng < 0):
-        raise ArgumentError(f"rng = {shown(rng)} is no seed; give a whole number from 0 on")
+        raise ArgumentError(f"rng = {shown(rng)} is not a seed; give a whole number from 0 on")
     return np.random.default_rng(rng)
 
 

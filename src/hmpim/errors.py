@@ -37,7 +37,7 @@ class UnitError(ArgumentError):
 
 
 class LimitsError(ArgumentError):
-    """Limits and wishes cannot both be met; the message says what would do."""
+    """Limits and wishes cannot both be met; the message says what is enough."""
 
 
 class RecordError(HmpimError, ValueError):

@@ -195,7 +195,7 @@ def test_units_of_bounds(table):
     assert held_against(table, read_bound("delay > 0.03 s")).failed == 8
     with pytest.raises(hmpim.HmpimError, match="'delay > 1Hz'"):
         held_against(table, read_bound("delay > 1Hz"))
-    with pytest.raises(hmpim.HmpimError, match="is no bound"):
+    with pytest.raises(hmpim.HmpimError, match="is not a bound"):
         read_bound("delay about 3")
 
 

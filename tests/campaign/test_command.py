@@ -114,5 +114,5 @@ def test_an_earlier_study_is_read_before_anything_moves_and_told_of_after(tmp_pa
     (first / "study.json").write_text("{", encoding="utf-8")
     result = invoke(short_plan(tmp_path, c=compared), "--out", tmp_path / "third")
     assert result.exit_code == 2
-    assert "is no study to compare with" in result.stderr
+    assert "is not a study to compare with" in result.stderr
     assert not (tmp_path / "third").exists()

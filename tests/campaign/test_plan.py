@@ -100,7 +100,7 @@ def test_refused_by_its_key(changes, message):
 def test_no_toml_is_refused(tmp_path):
     path = tmp_path / "plan.toml"
     path.write_bytes(b"\xff\x00 = [")
-    with pytest.raises(FormatError, match="is no TOML plan"):
+    with pytest.raises(FormatError, match="is not a TOML plan"):
         read_plan(path)
 
 

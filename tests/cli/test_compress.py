@@ -99,8 +99,8 @@ def test_records_are_fitted_together_without_a_file_between(folder, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["a.h5"], "--together fits several records as one, and one is given"),
-        (["a.h5", "b.h5", "--holdout", "0.3"], "--holdout is about one record, and 2 are given"),
+        (["a.h5"], "--together fits several records as one, but only one is given"),
+        (["a.h5", "b.h5", "--holdout", "0.3"], "--holdout applies to one record, but 2 are given"),
         (["a.h5", "a.h5"], "runs 1 and 2 hold the same samples"),
         (["a.h5", "two.h5"], "the record has 2 channels for --output (y, z)"),
         (["a.h5", "b.h5", "--output", "y", "--output", "z"], "and --output is given 2 times"),
@@ -129,7 +129,7 @@ def test_one_of_several_outputs_is_named(folder, tmp_path):
         (("compress", "a.h5", "-o", "small.csv"), "-o small.csv must end in one of .h5, .hdf5"),
         (("compress", "a.h5", "-o", "a.h5"), "is the record itself, which would be lost"),
         (("compress", "no.h5", "-o", "x.h5"), "no.h5"),
-        (("compress", "a.h5", "--lags", "0", "-o", "x.h5"), "lags = 0 is no window"),
+        (("compress", "a.h5", "--lags", "0", "-o", "x.h5"), "lags = 0 is not a window"),
         (("identify", "small.h5", "a.h5"), "small.h5 holds statistics and a.h5 does not"),
         (("identify", "small.h5", "--from", "3"), "--from is about the samples of a record"),
         (("identify", "small.h5", "--holdout", "0.5"), "--holdout is about the samples"),

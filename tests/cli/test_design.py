@@ -116,7 +116,7 @@ def test_every_kind_of_waveform_with_a_jerk_limit(tmp_path, kind):
 @pytest.mark.parametrize(
     ("more", "error", "message"),
     [
-        (("--wanted-snr", "90", "--noise", "0.1"), LimitsError, "signal-to-noise .* would do"),
+        (("--wanted-snr", "90", "--noise", "0.1"), LimitsError, "signal-to-noise .* is enough"),
         (("--wanted-snr", "90"), ArgumentError, "belong together"),
         (("--kind", "square"), ArgumentError, "--kind 'square' must be one of hmpim"),
         (("-o", "s.doc"), ArgumentError, r"--output s.doc must end in one of .csv"),

@@ -87,7 +87,7 @@ def test_without_any_limit():
         (("--amplitude", "nan"), "position limit = nan deg"),
         (("--plot", "t.gif"), "does not end in .png"),
         (("-o", "s.foo"), "--output s.foo must end in one of .csv, "),
-        (("--fs", "20"), "is not seen at fs = 20 Hz"),
+        (("--fs", "20"), "cannot be observed at fs = 20 Hz"),
     ],
 )
 def test_bad_input(more, message):

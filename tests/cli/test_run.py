@@ -66,7 +66,7 @@ def test_from_a_file_to_the_record_the_result_and_the_page(folder):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--rig", "eye", "s.csv"], "nothing would be kept of the run; name a file with -o"),
+        (["--rig", "eye", "s.csv"], "the run would not be saved; name a file with -o"),
         (["--rig", "eye", "s.csv", "-o", "s.csv"], "-o s.csv is the stimulus itself"),
         (
             ["--rig", "eye", "s.csv", "-o", "r.csv", "--log", "r.csv"],

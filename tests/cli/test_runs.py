@@ -69,8 +69,8 @@ def test_conditions(folder, conditions, names):
 @pytest.mark.parametrize(
     ("condition", "words"),
     [
-        ("delay", "is no condition"),
-        ("delay > slow", "'slow' is no number"),
+        ("delay", "is not a condition"),
+        ("delay > slow", "'slow' is not a number"),
         ("verdict > ok", "is a word; use = or !="),
         ("mass > 3", "'mass', which no run has; choose one of name"),
         ("delay > 3deg", "cannot be turned into"),
@@ -99,7 +99,7 @@ def test_list_and_comparison(folder, tmp_path):
 def test_bad_input_is_one_line(folder, tmp_path):
     done = run("runs", tmp_path / "nowhere")
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
-    assert "is no folder" in done.stderr
+    assert "is not a folder" in done.stderr
     done = run("runs", folder, "--where", "name = alone*", "--compare")
     assert done.exit_code == 2
     assert "0 of these runs have a result" in done.stderr

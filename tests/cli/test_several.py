@@ -92,7 +92,7 @@ def test_several_records_and_one_sheet_do_not_go_together(tmp_path):
     done = run(*files, "--input", "u", "--output", "y", "--sign", tmp_path / "r.html")
     assert done.exit_code == 2
     assert done.stderr == (
-        "hmpim: --sign is about one record, and 2 are given; leave it out, or give one\n"
+        "hmpim: --sign applies to one record, but 2 are given; leave it out, or give one\n"
     )
 
 

@@ -85,7 +85,7 @@ def test_both_at_once(folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["old.json"], "nothing to hold the result against"),
+        (["old.json"], "nothing to compare the result with"),
         (["old.json", "nowhere.csv"], "nowhere.csv"),
         (["right.csv", "right.csv"], "not a result"),
         (["old.json", "right.csv", "--noise-ratio", "0.5"], "noise_ratio = 0.5"),

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "hmpim"
 TEXT = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 WALK = TEXT.partition("## A walk")[2].partition("## Who may import whom")[0]
-STOPS = re.split(r"^\d+\. ", WALK.partition("On the ground")[0], flags=re.MULTILINE)[1:]
+STOPS = re.split(r"^\d+\. ", WALK.partition("At the bottom")[0], flags=re.MULTILINE)[1:]
 
 
 def test_each_room_of_the_walk_has_the_files_told_of():
@@ -50,7 +50,7 @@ def test_each_room_of_identification_is_told_of():
 
 
 def test_the_ground_is_there():
-    told = re.findall(r"`(\w+\.py)`", WALK.partition("On the ground")[2])
+    told = re.findall(r"`(\w+\.py)`", WALK.partition("At the bottom")[2])
     assert {*told, "__init__.py"} == {place.name for place in SOURCE.glob("*.py")}
 
 

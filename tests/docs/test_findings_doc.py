@@ -20,8 +20,8 @@ ROWS = {
     ]
     for name, text, start in (
         ("method", DOCS["method"], "## Verdict and warnings"),
-        ("rigs", DOCS["rigs"], "What the run says stands"),
-        ("formats", DOCS["formats"], "It stands in the record"),
+        ("rigs", DOCS["rigs"], "A run adds these findings"),
+        ("formats", DOCS["formats"], "Whatever is missing from a file"),
     )
 }
 ELSEWHERE = {

@@ -44,8 +44,8 @@ def test_a_row_says_what_is_so(row):
 
 
 def test_the_limits_are_those_of_the_code():
-    assert f"may take {MEMORY:g} GiB" in PAGE
-    assert f"and {TIME:g} s and 5 s more for each MiB" in PAGE
+    assert f"may use {MEMORY:g} GiB" in PAGE
+    assert f"and {TIME:g} s plus 5 s for each MiB" in PAGE
 
 
 READER = """

@@ -49,7 +49,7 @@ def test_programs_run_and_speak_the_protocol_of_the_code(tmp_path):
     assert told.stdout.splitlines() == [line[2:] for line in shown if line.startswith("<")]
     assert sent[0].startswith(f"{_GREETING} rate=")
     defaults = {f.name: f.default for f in dataclasses.fields(ProcessRig)}
-    assert f"reported after {defaults['answer']:g} s" in TEXT
+    assert f"within {defaults['answer']:g} s (option `answer`" in TEXT
     assert f"for the greeting, {defaults['startup']:g} s" in TEXT
 
 

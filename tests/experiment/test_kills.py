@@ -90,7 +90,7 @@ def check(table, folder, kind, at, nursery=None):
     elif kind == "interrupt":
         assert code == 130
         assert "ended early (Ctrl-C)" in str(kept.record.findings)
-        assert "table was told to stop" in (folder / "run.log").read_text()
+        assert "table was commanded to stop" in (folder / "run.log").read_text()
     elif kind == "exception":
         assert code == 1
         assert "ZeroDivisionError: from a watcher" in said
@@ -98,7 +98,7 @@ def check(table, folder, kind, at, nursery=None):
         assert f"ended early ({words})" in str(kept.record.findings)
         log = (folder / "run.log").read_text()
         assert f"fault  {words}" in log or f"fault {words}" in log
-        assert "told to stop" in log
+        assert "commanded to stop" in log
     else:
         assert code == 2
         assert "its watchdog" in said or "stopped by itself" in said  # who sees it first

@@ -258,7 +258,7 @@ def test_a_full_disk_is_refused_before_anything_moves(tmp_path, monkeypatch, nam
     rig = Failing()
     usage = SimpleNamespace(total=1 << 30, used=1 << 30, free=20_000)
     monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage)
-    with pytest.raises(ArgumentError, match=r"is going to take .* MB and its disk has 0\.02 MB"):
+    with pytest.raises(ArgumentError, match=r"needs .* MB, but its disk has only 0\.02 MB"):
         run(rig, SWEEP, path=tmp_path / name)
     assert "prepare" not in rig.told
     assert not any(tmp_path.iterdir())
@@ -278,7 +278,9 @@ def test_a_disk_that_fails_later_stops_the_rig_and_leaves_what_was_written(tmp_p
     def later(played):
         ready.is_set = played.block.time[-1] > 2.9
 
-    with pytest.raises(RecordError, match=r"takes no more samples .Input/output error.; what was"):
+    with pytest.raises(
+        RecordError, match=r"accepts no more samples .Input/output error.; what was"
+    ):
         run(rig, SWEEP, path=tmp_path / "r.h5", rng=1, subscribers=[later])
     assert rig.told == ["prepare", "stop", "exit"]
     kept = read_recording(tmp_path / "r.h5")

@@ -289,7 +289,7 @@ def test_a_stop_that_fails_with_what_came_before_says_the_cause_first():
             raise OSError("no answer to the stop")
 
     pulled = Pulled(fault=RigError("nothing came for 0.5 s"), fails_in="play")
-    said = "failed: nothing came for 0.5 s; then it could not be told to stop: OSError: no answer"
+    said = "failed: nothing came for 0.5 s; then it could not be stopped: OSError: no answer"
     with pytest.raises(RigError, match=said) as failure:
         run(pulled, SINE)
     assert isinstance(failure.value.__cause__, RigError)
@@ -454,12 +454,12 @@ def test_commands_go_by_the_clock_of_the_run():
 
 @pytest.mark.parametrize("rig", [None, abs, "sensor", Sensor])
 def test_what_is_no_rig(rig):
-    with pytest.raises(ArgumentError, match=r"is no rig: .* FunctionRig\(function=\.\.\.\)"):
+    with pytest.raises(ArgumentError, match=r"is not a rig: .* FunctionRig\(function=\.\.\.\)"):
         run(rig, SINE)
 
 
 def test_what_is_no_stimulus():
-    with pytest.raises(ArgumentError, match=r"is no Stimulus; make one with design"):
+    with pytest.raises(ArgumentError, match=r"is not a Stimulus; make one with design"):
         run(Spy(), SINE.waveform)
 
 

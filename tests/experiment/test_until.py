@@ -243,8 +243,8 @@ def test_a_rule_reads_back_as_it_is_printed():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "'' is no target; write one as delay=0.4ms"),
-        ("delay", "'delay' is no target"),
+        ("", "'' is not a target; write one as delay=0.4ms"),
+        ("delay", "'delay' is not a target"),
         ("delay=0.4", "delay needs a unit, s for instance"),
         ("delay=0.4Hz", "--until delay: unit 'Hz' cannot be turned into 's'"),
         ("delay=0.4ms,delay=1%", "'delay' is given twice"),
@@ -252,7 +252,7 @@ def test_a_rule_reads_back_as_it_is_printed():
         ("bias=3deg", "bias is in the channel's own unit: leave 'deg' out"),
         ("damping_ratio=3Hz", "damping_ratio has no unit"),
         ("delay=0ms", "delay = 0.0 must be a positive"),
-        ("delay=1.2.3ms", "is no number"),
+        ("delay=1.2.3ms", "is not a number"),
     ],
 )
 def test_what_is_no_rule_is_refused(text, words):
@@ -263,9 +263,9 @@ def test_what_is_no_rule_is_refused(text, words):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({}, "nothing is asked for"),
+        ({}, "no target is given"),
         ({"delay": 1e-3, "looks": 0}, "looks = 0 must be 1 or more"),
-        ({"delay": 1e-3, "relative": ("bias",)}, "relative = 'bias' is no target"),
+        ({"delay": 1e-3, "relative": ("bias",)}, "relative = 'bias' is not a target"),
         ({"delay": "1 ms"}, "delay = '1 ms' is not"),
     ],
 )
@@ -278,7 +278,7 @@ def test_a_pair_that_is_not_there_is_refused_before_anything_moves():
     unit = Following()
     rig = FakeRig(answer=unit, moves=True, limits=LIMITS)
     options = RunOptions(clock=ManualClock(), realtime=False)
-    with pytest.raises(ArgumentError, match="is about 'z', and the channels are 'u', 'y'"):
+    with pytest.raises(ArgumentError, match="refers to 'z', but the channels are 'u', 'y'"):
         hmpim.run(rig, sweeps(), until=Until(delay=1e-3, pair=("z", "u")), options=options)
     step = Stimulus(waveform=hmpim.Ramp(duration=1.0, rate=0.1), fs=200.0, unit="deg")
     with pytest.raises(ArgumentError, match="the stimulus has no band"):

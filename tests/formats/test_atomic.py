@@ -94,7 +94,7 @@ def test_what_cannot_be_written_is_refused_up_front(tmp_path, monkeypatch):
         check_writable(tmp_path / "no" / "run.h5")
     with pytest.raises(ArgumentError, match="is a folder; name a file in it"):
         check_writable(tmp_path)
-    with pytest.raises(ArgumentError, match=r"take 1e\+12 MB and its disk has .* make room"):
+    with pytest.raises(ArgumentError, match=r"needs 1e\+12 MB, but its disk has .* make room"):
         check_writable(tmp_path / "run.h5", size=10**18)
     with pytest.raises(ArgumentError, match="cannot be written"):
         check_writable("/proc/run.h5")

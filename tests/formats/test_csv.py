@@ -114,7 +114,7 @@ def test_a_spoilt_cell_in_a_column_that_is_not_asked_for_does_no_harm(file):
     [
         ("time,u,y\n0,1,2\n0.1,nan,4\n", r"channel 'u' holds 1 numbers in 2 samples"),
         ("time,u,y\n0,1,2\n0.1,3,OL\n", "line 3, column 'y' holds 'OL', which is not a number"),
-        ("time,u,y\n0,0,1,0,2,0\n0,1,3,0,4,0\n", "decimal comma is no delimiter"),
+        ("time,u,y\n0,0,1,0,2,0\n0,1,3,0,4,0\n", "decimal comma is not a delimiter"),
         ("time,u,y\n0,1,2\n0.1,3\n0.2,5,6\n", "line 3 has 2 cells where 3 are needed; correct"),
         ("time,u,y\n", r"has column names \(time, u, y\) and no samples"),
         ("time,u,y\n0,1,2\n", "holds one sample"),
@@ -196,7 +196,7 @@ def test_missing_cells_are_gaps_of_their_channel_alone(file):
 
 def test_a_recording_that_starts_again_is_refused(file):
     rows = "".join(f"{k % 30},{k},{k}\n" for k in range(60))
-    with pytest.raises(RecordError, match=r"time starts again in .*: it holds 2 recordings"):
+    with pytest.raises(RecordError, match=r"time starts again in .*: the file holds 2 recordings"):
         read(file("time,u,y\n" + rows))
 
 
@@ -242,7 +242,7 @@ def test_contradictory_options_are_refused(file, options, words):
     ("heading", "words"),
     [
         ("time,u [furlongz],y", r"column 'u \[furlongz\]'.*is not known"),
-        ("time [deg],u,y", "'deg' is no unit of time"),
+        ("time [deg],u,y", "'deg' is not a unit of time"),
     ],
 )
 def test_units_that_cannot_be(file, heading, words):

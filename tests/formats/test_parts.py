@@ -59,7 +59,7 @@ def test_sweeps_are_said_and_cut_out(log):
     assert first.samples == other.samples
     assert np.abs(first.inputs[0].values - other.inputs[0].values).max() < 2e-9
     assert other.inputs[0].time[0] - first.inputs[0].time[0] == pytest.approx(9.005, abs=1e-9)
-    with pytest.raises(ArgumentError, match=r"sweep 3 is asked for, and 'log\.csv' has 2 motions"):
+    with pytest.raises(ArgumentError, match=r"there is no sweep 3: 'log\.csv' has 2 motions"):
         read(log, options=ReadOptions(sweep=3))
     with pytest.raises(RecordError, match=r"no sweep is found in 'u' of 'log\.csv': it has 1"):
         read_sweeps(log, options=ReadOptions(start=2.5, stop=3.0))

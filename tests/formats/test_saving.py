@@ -153,7 +153,7 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
             "holds what repeats have in common, and the result of one",
         ),
         ('{"schema": "hmpim/model/1"}', "holds an exported model, and the result of one record is"),
-        ('{"schema": "hmpim/identification/2"}', "not a whole result: 'pairs' is missing"),
+        ('{"schema": "hmpim/identification/2"}', "not a complete result: 'pairs' is missing"),
     ):
         (tmp_path / "r.json").write_text(content)
         with pytest.raises(FormatError, match=words):
@@ -172,7 +172,7 @@ def test_what_cannot_be_saved_or_loaded(result, tmp_path):
             "fast",
             r"parameters.delay.value = 'fast' is not a number",
         ),
-        (("dynamics", "covariance"), [[None]], "no square of finite numbers"),
+        (("dynamics", "covariance"), [[None]], "not a square matrix of finite numbers"),
     ],
 )
 def test_a_result_that_was_edited_is_refused_when_it_is_read(result, tmp_path, place, value, told):

@@ -216,7 +216,7 @@ def test_a_table_that_is_cut_short_is_refused(tmp_path, kept):
     whole = lines[: int(len(lines) * kept)]
     for text in ("".join(whole), "".join(whole) + "1.5,0."):
         (tmp_path / "cut.csv").write_text(text)
-        words = rf"{len(whole) - 2} of its {stimulus.samples} samples are whole; copy it again"
+        words = rf"{len(whole) - 2} of its {stimulus.samples} samples are complete; copy it again"
         with pytest.raises(FormatError, match=words):
             read_stimulus(tmp_path / "cut.csv")
 
@@ -244,5 +244,5 @@ def test_unknown_suffixes_and_waveforms():
     class Mine(Sine):
         pass
 
-    with pytest.raises(ArgumentError, match="a Mine is no waveform of this package"):
+    with pytest.raises(ArgumentError, match="a Mine is not a waveform of this package"):
         stimulus_to_toml(Stimulus(waveform=Mine(frequency=1.0, duration=1.0), fs=8.0))

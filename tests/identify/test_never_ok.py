@@ -215,7 +215,7 @@ def test_an_output_that_never_moves_is_refused():
 def test_samples_that_are_no_numbers_are_refused():
     y = sensed(np.random.default_rng(0))
     y[500:900] = np.nan
-    with pytest.raises(hmpim.HmpimError, match=r"nan at sample 500 \(400 such"):
+    with pytest.raises(hmpim.HmpimError, match=r"nan at sample 500 \(400 in all"):
         judged(y)
 
 

@@ -97,7 +97,7 @@ def test_draws_have_sizes_of_their_own():
 def test_what_cannot_be_is_refused():
     with pytest.raises(ArgumentError, match=r"size = -0\.1 of backlash must be more than 0"):
         part("backlash", "output", -0.1)
-    with pytest.raises(ArgumentError, match="kind = 'saturation' is no nonlinearity"):
+    with pytest.raises(ArgumentError, match="kind = 'saturation' is not a nonlinearity"):
         part("saturation", "output", 0.1)
     with pytest.raises(ArgumentError, match="reach = 0"):
         part("curvature", "output", 0.1, reach=0.0)

@@ -93,7 +93,7 @@ def test_the_tail_holds_the_slowest_response():
             lambda: Accuracy(
                 delay=None, natural_frequency=None, scale_factor=None, damping_ratio=None
             ),
-            "no accuracy is asked for",
+            "no accuracy is given",
         ),
     ],
 )

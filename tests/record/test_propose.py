@@ -69,7 +69,7 @@ def test_what_tells_nothing_is_left_out_with_its_reason():
     assert (found.inputs, found.outputs) == (("u",), ("y",))
     reasons = dict(found.reasons)
     assert reasons["index"] == "counts up evenly, as an index or a time does"
-    assert reasons["dead"] == "reads 3.5 from end to end"
+    assert reasons["dead"] == "always reads 3.5"
 
 
 def test_unrelated_channels_get_no_proposal():

@@ -27,7 +27,7 @@ def test_a_constant_channel_is_dead(level):
 
 def test_a_dead_input_is_named():
     (finding,) = inspect_values(Record.from_arrays({"u": 0 * U + 2}, {"y": U}, fs=200.0))
-    assert "channel 'u' reads 2 from end to end" in finding.message
+    assert "channel 'u' is 2 from beginning to end" in finding.message
 
 
 def test_an_output_that_dies_midway_is_stuck():

@@ -13,7 +13,7 @@ from hmpim.record import Channel, Record
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ([1.0, np.nan, 2.0], r"'u' holds nan at sample 1 \(1 such in all\)"),
+        ([1.0, np.nan, 2.0], r"'u' holds nan at sample 1 \(1 in all\)"),
         ([1.0, 2.0, -np.inf], "'u' holds -inf at sample 2"),
         ([[1.0, 2.0, 3.0]], r"'u' has shape \(1, 3\); give one dimension"),
         (["a", "b", "c"], "'u' is not numeric"),

@@ -87,13 +87,13 @@ def fails_at_three(u):
         (FunctionRig(function=lambda u: u / 0 if u > 0.45 else u, mode="sample"), "at sample 5"),
         (
             FunctionRig(function=lambda u: np.where(u > 0.45, np.nan, u)),
-            r"returned nan at sample 5, for the input 0.5 \(5 such in all\)",
+            r"returned nan at sample 5, for the input 0.5 \(5 in all\)",
         ),
         (FunctionRig(function=lambda u: "a", mode="sample"), "failed at sample 0"),
         (FunctionRig(function=lambda u: None, mode="sample"), "sample 0.*it returned None"),
-        (FunctionRig(function=lambda u: np.complex128(u), mode="sample"), "sample 0.*no real"),
-        (FunctionRig(function=lambda u: 1j * u), "it returned 0j, which is no real number"),
-        (FunctionRig(function=lambda u: [None] * u.size), "it returned None, which is no real"),
+        (FunctionRig(function=lambda u: np.complex128(u), mode="sample"), "sample 0.*not a real"),
+        (FunctionRig(function=lambda u: 1j * u), "it returned 0j, which is not a real number"),
+        (FunctionRig(function=lambda u: [None] * u.size), "it returned None, which is not a real"),
     ],
 )
 def test_failures_are_told_with_their_place(rig, words):

@@ -106,7 +106,7 @@ def test_only_the_chirp_excites_the_whole_band():
         (lambda: Chirp(band=(3.0, 1.0), duration=1.0), "does not rise"),
         (
             lambda: SumOfSines(amplitudes=(1.0,), frequencies=(1.0, 2.0), duration=1.0),
-            "1 amplitudes, 2 frequencies and 0 phases do not go together",
+            "1 amplitudes, 2 frequencies and 0 phases do not match",
         ),
         (
             lambda: SumOfSines(amplitudes=(1.0, 1.0), frequencies=(2.0, 1.0), duration=1.0),

@@ -302,7 +302,7 @@ def test_stated_lead_is_time_and_the_motion_in_it_is_as_gentle():
 def test_too_short_a_lead_is_refused_with_one_that_does():
     with pytest.raises(LimitsError, match=r"lead = 0.0001 s is too short") as refusal:
         design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=0.0001)
-    enough = float(re.search(r"lead = ([\d.]+) s would do", str(refusal.value))[1])
+    enough = float(re.search(r"lead = ([\d.]+) s is enough", str(refusal.value))[1])
     fits = design(band=(0.1, 40), duration=10, fs=500, limits=FIG_13, lead=enough)
     assert fits.limits.use(fits.peaks) <= 1.0
 
@@ -350,7 +350,7 @@ def test_without_a_position_limit_the_others_scale_it():
         ({"band": (-0.1, 20.0)}, "start of the band = -0.1 Hz"),
         ({"band": (0.1, math.nan)}, "end of the band = nan Hz"),
         ({"duration": -10.0}, "duration = -10.0 s"),
-        ({"duration": 0.05}, "makes 0.503 cycles in 0.05 s, .* a duration of 0.0996 s would do"),
+        ({"duration": 0.05}, "makes 0.503 cycles in 0.05 s, .* a duration of 0.0996 s is enough"),
         ({"fs": 0.0}, "fs = 0.0 Hz"),
         ({"fs": math.nan}, "fs = nan Hz"),
         ({"limits": Limits()}, "no limit is finite"),

@@ -385,7 +385,7 @@ def test_ratio_wanted_may_depend_on_frequency():
         ),
         (lambda s: measured_noise(np.zeros(10), fs=10.0), "at least 64 finite samples"),
         (lambda s: OverFrequency(frequency=(2.0, 1.0), value=(1.0, 1.0)), "positive and rise"),
-        (lambda s: OverFrequency(frequency=(1.0,), value=()), "do not go together"),
+        (lambda s: OverFrequency(frequency=(1.0,), value=()), "do not match"),
         (
             lambda s: signal_to_noise(Stimulus(waveform=Step(duration=1.0), fs=10.0), noise=1.0),
             "a Step has no band of its own",

@@ -84,7 +84,7 @@ def test_it_is_saved_and_read_back(stimulus):
     ("changed", "words"),
     [
         ({"sweep": 4.0}, "sweep = 4 s is longer than the duration of 3 s"),
-        ({"sweep": 0.05}, "less than one cycle; 0.0996 s would do"),
+        ({"sweep": 0.05}, "less than one cycle; 0.0996 s is enough"),
         ({"sweep": -1.0}, "sweep = -1.0 s must be a positive"),
         ({"kind": "hmpim"}, "sweep = 0.6 s is for kind = 'repeated'"),
         ({"extinction": 1.0}, "extinction = 1.0 is for sweeps"),

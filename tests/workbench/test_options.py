@@ -9,8 +9,8 @@ from hmpim.cli.main import app
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (["--port", "70000"], "--port 70000 is no port"),
-        (["--max-upload", "0"], "--max-upload 0 MB takes nothing"),
+        (["--port", "70000"], "--port 70000 is not a port"),
+        (["--max-upload", "0"], "--max-upload 0 MB allows no file"),
         (["--grace", "0"], "--grace 0 s"),
         (["--rig-file", "nowhere.toml"], "'nowhere.toml' cannot be read"),
         (["--rig", "warp drive"], "there is no rig 'warp drive'; there are sensor"),

@@ -164,7 +164,7 @@ def test_five_axes_run_once_every_light_is_green(page, served):
     page.get_by_role("link", name="To the run").click()
     page.get_by_role("button", name="Arm", exact=True).click()
     page.get_by_role("button", name="Start").click()
-    page.get_by_text("Played to its end").wait_for()
+    page.get_by_text("Played to the end").wait_for()
     assert page.locator(".hm-strip canvas").count() == 5
     (path,) = kept(served, "table")
     record = hmpim.load(path)
@@ -212,7 +212,7 @@ def test_a_lost_window_ends_its_run_and_the_record_is_kept(page, served, window)
     record = hmpim.load(folder / "run.h5")
     assert record.duration < 300.0
     assert any("is gone" in f.message for f in record.findings)
-    assert "was told to stop" in (folder / "run.log").read_text()
+    assert "was commanded to stop" in (folder / "run.log").read_text()
     page.get_by_text("Not armed").wait_for()
 
 

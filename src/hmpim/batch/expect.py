@@ -89,7 +89,7 @@ def read_bound(text: str) -> Bound:
     >>> read_bound("speed < 5")
     Traceback (most recent call last):
     ...
-    hmpim.errors.ArgumentError: 'speed < 5' bounds 'speed', which is no parameter; ...
+    hmpim.errors.ArgumentError: 'speed < 5' bounds 'speed', which is not a parameter; ...
     """
     match = _BOUND.match(text)
     try:
@@ -97,10 +97,10 @@ def read_bound(text: str) -> Bound:
             raise ValueError(text)
         number = float(match["number"])
     except ValueError:
-        raise ArgumentError(f"{text!r} is no bound; write it as 'delay < 5ms'") from None
+        raise ArgumentError(f"{text!r} is not a bound; write it as 'delay < 5ms'") from None
     if match["name"] not in PARAMETERS:
         raise ArgumentError(
-            f"{text!r} bounds {match['name']!r}, which is no parameter; choose one of "
+            f"{text!r} bounds {match['name']!r}, which is not a parameter; choose one of "
             f"{', '.join(PARAMETERS)}"
         )
     bound = Bound(

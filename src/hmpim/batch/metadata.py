@@ -90,7 +90,7 @@ def read_metadata(path: str, column: str) -> Beside:
     except (OSError, ValueError, IndexError) as error:
         if isinstance(error, FormatError):
             raise
-        raise FormatError(f"{path!r} is no table of metadata: {error}") from None
+        raise FormatError(f"{path!r} is not a table of metadata: {error}") from None
     if twice := [name for name, count in Counter(names).items() if count > 1]:
         raise FormatError(
             f"{path!r} has {names.count(twice[0])} rows of {twice[0]!r}; leave one, as each "

@@ -84,7 +84,7 @@ class Known:
     Parameters
     ----------
     folder : Path
-        The batch's folder. A part in it that is no Parquet file is moved aside, so that its
+        The batch's folder. A part in it that is not a Parquet file is moved aside, so that its
         records are done again.
     """
 
@@ -195,7 +195,7 @@ def read_stamp(folder: Path) -> Mapping[str, Any]:
     except FileNotFoundError:
         raise FormatError(f"{str(folder)!r} holds no batch: there is no {STAMP} in it") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FormatError(f"{stamp} is damaged ({error}); start anew with --fresh") from None
+        raise FormatError(f"{stamp} is damaged ({error}); start afresh with --fresh") from None
     if schema != _SCHEMA:
         raise FormatError(f"{stamp} is of schema {schema!r}; this version reads {_SCHEMA!r}")
     return dict(told)
@@ -209,7 +209,7 @@ def _same(stamp: Path, request: Request) -> tuple[str, ...]:
         changed = next((k for k in now if before.get(k) != now[k]), "request")
         raise ArgumentError(
             f"{str(stamp.parent)!r} holds a batch with {changed} = {before.get(changed)!r}, and "
-            f"{now.get(changed)!r} is asked for now; name another folder, or start anew with "
+            f"{now.get(changed)!r} is given now; name another folder, or start afresh with "
             "--fresh"
         )
     return tuple(told["metadata"])

@@ -65,7 +65,8 @@ class Cluster:
     def __post_init__(self) -> None:
         if not 1 <= self.per_task <= 10_000:
             raise ArgumentError(
-                f"per_task = {self.per_task} records is no task; give 1 to 10000, usually 50 to 200"
+                f"per_task = {self.per_task} records is not a task size; give 1 to 10000, "
+                "usually 50 to 200"
             )
         if self.workers is not None and not 0 <= self.workers <= 1024:
             raise ArgumentError(f"workers = {self.workers}; give a number of processes, or 0")

@@ -170,7 +170,7 @@ def read_plan(path: Path) -> Plan:
     try:
         table = tomllib.loads(data.decode("utf-8"))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise FormatError(f"{path} is no TOML plan: {error}") from error
+        raise FormatError(f"{path} is not a TOML plan: {error}") from error
     try:
         return replace(parse_plan(table), folder=str(path.resolve().parent))
     except HmpimError as error:
@@ -271,7 +271,7 @@ def _axis(name: str, table: Table, kind: RigKind) -> AxisWish:
     from hmpim.rigs.table import AXES
 
     if kind == "table" and name not in AXES:
-        raise ArgumentError(f"axes.{name} is no axis of the table; use {', '.join(AXES)}")
+        raise ArgumentError(f"axes.{name} is not an axis of the table; use {', '.join(AXES)}")
     band = _band(table, "band")
     limits = sensor = None
     if kind != "table":

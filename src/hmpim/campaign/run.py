@@ -120,7 +120,7 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
             stamped = json.loads(stamp.read_text(encoding="utf-8"))
             schema, digest = stamped["schema"], stamped["plan"]
         except (ValueError, KeyError, TypeError) as error:
-            raise FormatError(f"{stamp} is damaged ({error}); start anew with --fresh") from error
+            raise FormatError(f"{stamp} is damaged ({error}); start afresh with --fresh") from error
         if schema != CAMPAIGN_SCHEMA:
             raise FormatError(
                 f"{folder} holds a campaign of schema {schema!r} and this version writes "
@@ -130,7 +130,7 @@ def _open(plan: Plan, folder: Path, *, fresh: bool) -> None:
         if digest != plan.digest:
             raise ArgumentError(
                 f"{folder} holds a campaign of another plan ({digest[:12]}, this one is "
-                f"{plan.digest[:12]}): the plan was changed since; start anew with --fresh, or "
+                f"{plan.digest[:12]}): the plan was changed since; start afresh with --fresh, or "
                 "name another folder"
             )
     _write(stamp, {"schema": CAMPAIGN_SCHEMA, "name": plan.name, "plan": plan.digest})

@@ -252,7 +252,7 @@ def earlier_parameters(path: Path) -> dict[tuple[str, str], dict[str, Any]]:
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, FormatError):
             raise
-        raise FormatError(f"{path} is no study to compare with: {error!r}") from error
+        raise FormatError(f"{path} is not a study to compare with: {error!r}") from error
 
 
 def check_earlier(plan: Plan, path: Path) -> None:

@@ -74,7 +74,7 @@ def batch(
             "--pool-by",
             metavar="NAME",
             help="Identify the records that share this column of metadata as one, such as a "
-            "unit's serial number; all: one model of all. Samples stay where they are.",
+            "unit's serial number; all: one model for all records. Samples are not copied.",
         ),
     ] = "",
     lags: Annotated[
@@ -116,7 +116,7 @@ def batch(
         bool,
         typer.Option(
             "--resume/--fresh",
-            help="Continue where an earlier run of the same batch stopped, or start anew.",
+            help="Continue where an earlier run of the same batch stopped, or start afresh.",
         ),
     ] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no table.")] = False,
@@ -163,7 +163,7 @@ def batch(
     for name in by or ():
         if name not in table.metadata:
             known = ", ".join(table.metadata) or "none"
-            raise ArgumentError(f"--by {name!r} is no column of metadata; those are {known}")
+            raise ArgumentError(f"--by {name!r} is not a column of metadata; those are {known}")
     outcomes = write_study(table, page, bounds=bounds, by=by or ())
     if not quiet:
         _print(table)

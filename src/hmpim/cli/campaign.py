@@ -35,7 +35,7 @@ def campaign(
         bool,
         typer.Option(
             "--resume/--fresh",
-            help="Continue where an earlier run of the same plan stopped, or start anew.",
+            help="Continue where an earlier run of the same plan stopped, or start afresh.",
         ),
     ] = True,
     json_file: Annotated[

@@ -80,9 +80,9 @@ def compress(
     ] = Bias.OWN,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing.")] = False,
 ) -> None:
-    """Compress records to the few kilobytes that identification needs of them.
+    """Compress records to the statistics that identification needs, some tens of kilobytes.
 
-    `hmpim identify` takes the file as it takes a record; what needs the samples is then left out.
+    `hmpim identify` accepts the file in place of a record, but skips checks that need the samples.
     """
     _check_file(out)
     check_files(reads={"the record": records}, writes={"-o": out})
@@ -201,7 +201,7 @@ def _join(
     except ArgumentError as error:
         here, there = files
         raise ArgumentError(
-            f"{here} (here) and {there} (there) do not go together: {error}"
+            f"{here} (here) and {there} (there) cannot be combined: {error}"
         ) from None
 
 

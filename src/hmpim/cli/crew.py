@@ -13,6 +13,6 @@ Scheduler = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers", metavar="N", help="Processes on this computer; 0: no further process."
+        "--workers", metavar="N", help="Processes on this computer; 0: work in this process."
     ),
 ]

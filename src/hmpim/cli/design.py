@@ -69,7 +69,7 @@ def design(
         str,
         typer.Option(
             metavar="auto|0|S",
-            help="Seconds to leave rest and to return to it; 0: the paper's waveform.",
+            help="Seconds to accelerate from rest, and to return to it; 0: the paper's waveform.",
         ),
     ] = "auto",
     tail: Annotated[
@@ -89,7 +89,7 @@ def design(
     wanted_snr: Annotated[
         float | None,
         typer.Option(
-            help="Lowest signal-to-noise ratio allowed at any frequency, dB; otherwise, exit."
+            help="Refuse a design with a lower signal-to-noise ratio at any frequency, dB."
         ),
     ] = None,
     noise: Annotated[
@@ -109,7 +109,7 @@ def design(
     json_file: Annotated[
         Path | None,
         typer.Option(
-            "--json", metavar="FILE", help="JSON of gain, extinction, peaks and the rest."
+            "--json", metavar="FILE", help="Write gain, extinction, peaks and more as JSON."
         ),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Picture of the time histories, PNG.")] = None,

@@ -99,7 +99,7 @@ def export(
         ),
     ] = None,
 ) -> None:
-    """Write what was identified as a model for another tool, error bars and origin included.
+    """Export an identified model to another tool, with its error bars and origin.
 
     What the target represents exactly, and what it approximates and how closely, is stated in the
     file that is written.

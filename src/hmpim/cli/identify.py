@@ -104,8 +104,8 @@ def identify(
         bool,
         typer.Option(
             "--together",
-            help="Fit one model to all records, each a run of its own with its own bias and "
-            "beginning, instead of averaging or comparing them.",
+            help="Fit one model to all records, each with its own bias and initial state, "
+            "instead of averaging or comparing them.",
         ),
     ] = False,
     intersample: Annotated[
@@ -128,9 +128,9 @@ def identify(
         Kept,
         typer.Option(
             "--nonlinear",
-            help="What becomes of backlash, a dead zone, friction or a spring. modelled: part of "
-            "the model, with the linear part's figures; reported: named only, with the figures of "
-            "the best linear model at this amplitude.",
+            help="How to treat backlash, a dead zone, friction or a spring. modelled: include it "
+            "in the model and give the linear part's figures; reported: only name it and give the "
+            "figures of the best linear model at this amplitude.",
         ),
     ] = Kept.MODELLED,
     holdout: Annotated[
@@ -152,7 +152,7 @@ def identify(
     structure: Annotated[
         list[str] | None,
         typer.Option(
-            "--structure", metavar="NAME", help="Try this structure alone; may be repeated."
+            "--structure", metavar="NAME", help="Fit only this structure; may be repeated."
         ),
     ] = None,
     hand: Annotated[
@@ -184,7 +184,7 @@ def identify(
     """Find every parameter of a measured record, each with its error bar.
 
     Several records of one test are averaged, and their scatter is compared with the stated errors;
-    records at several amplitudes show where the unit is linear. With --together all are one fit.
+    records at several amplitudes show where the unit is linear. --together fits all as one.
     """
     check_files(
         reads={"the record": [*records, *(beside or [])]},
@@ -297,7 +297,8 @@ def _joined(
     """Records as the runs of one fit, of the input and the output that are named, if any."""
     if len(given) < 2:
         raise ArgumentError(
-            "--together fits several records as one, and one is given; leave it out, or give more"
+            "--together fits several records as one, but only one is given; leave it out, "
+            "or give more"
         )
     _check_single(len(given), {name: options[name] for name in ("--reference", "--holdout")})
     joined = runs_of(given, named)
@@ -329,7 +330,7 @@ def _by_hand(given: Sequence[str]) -> dict[str, float]:
             values[name.strip()] = float(value)
         except ValueError:
             raise ArgumentError(
-                f"--hand {text!r} is no NAME=VALUE; write bandwidth_phase90=33"
+                f"--hand {text!r} is not NAME=VALUE; write bandwidth_phase90=33"
             ) from None
     return values
 
@@ -339,7 +340,7 @@ def _check_single(count: int, options: Mapping[str, object]) -> None:
     for option, wanted in options.items():
         if count > 1 and wanted is not None:
             raise ArgumentError(
-                f"{option} is about one record, and {count} are given; leave it out, or give one"
+                f"{option} applies to one record, but {count} are given; leave it out, or give one"
             )
 
 

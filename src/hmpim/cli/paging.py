@@ -46,7 +46,7 @@ Sign = Annotated[
 Figures = Annotated[
     Path | None,
     typer.Option(
-        "--figures", metavar="DIR", help="Write every figure as SVG and PNG, its numbers as CSV."
+        "--figures", metavar="DIR", help="Write every figure as SVG and PNG, and its data as CSV."
     ),
 ]
 

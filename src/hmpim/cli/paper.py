@@ -28,7 +28,7 @@ def paper(
     ] = None,
     more: Annotated[list[str] | None, typer.Argument(metavar="[NUMBER]...", hidden=True)] = None,
 ) -> None:
-    """Make the paper's figures again, and a table of its printed values next to ours.
+    """Reproduce the paper's figures, and a table of its printed values next to ours.
 
     Writes each figure as PNG and SVG, the table as table.md and table.json, and index.html
     with all of it.
@@ -58,7 +58,9 @@ def _numbers(given: Sequence[str], more: Sequence[str]) -> list[int] | None:
     words = [word for text in (*given, *more) for word in text.split(",") if word]
     for word in words:
         if not word.isdecimal():
-            raise ArgumentError(f"--figures {word!r} is no figure's number; write --figures 12 13")
+            raise ArgumentError(
+                f"--figures {word!r} is not a figure's number; write --figures 12 13"
+            )
     return sorted({int(word) for word in words}) or None
 
 

@@ -75,7 +75,7 @@ Unit = Annotated[
     typer.Option(
         "--unit",
         metavar="NAME=UNIT",
-        help="Unit of a channel, where the file does not state it; may be repeated.",
+        help="Unit of a channel, if the file does not state it; may be repeated.",
     ),
 ]
 From = Annotated[
@@ -91,7 +91,7 @@ Sweep = Annotated[
     typer.Option(
         "--sweep",
         metavar="N|all",
-        help="Take one sweep of several in a log, or all of them as repeats.",
+        help="Use one of several sweeps in a log, or all of them as repeats.",
     ),
 ]
 Offset = Annotated[
@@ -99,8 +99,8 @@ Offset = Annotated[
     typer.Option(
         "--offset",
         metavar="NAME=TIME|?",
-        help="By how much the clock of a channel, or of a --beside file, is late, such as "
-        "y=3.2ms; ? if unknown. May be repeated.",
+        help="How late the clock of a channel, or of a --beside file, is, such as y=3.2ms; "
+        "? if unknown. May be repeated.",
     ),
 ]
 Beside = Annotated[
@@ -120,7 +120,7 @@ Common = Annotated[
 StampChoice = Annotated[
     Stamps,
     typer.Option(
-        "--stamps", help="Which stamp counts where a message has two: its sender's or the log's."
+        "--stamps", help="Time stamp to use if a message has two: the sender's or the log's."
     ),
 ]
 Sheet = Annotated[
@@ -152,7 +152,9 @@ def seconds(text: str, option: str) -> float:
             raise ValueError(text)
         return float(match["number"]) * conversion_factor(match["unit"] or "s", to="s")
     except (ValueError, UnitError):
-        raise ArgumentError(f"{option}: {text!r} is no time; write it as 3.2ms or 0.0032") from None
+        raise ArgumentError(
+            f"{option}: {text!r} is not a time; write it as 3.2ms or 0.0032"
+        ) from None
 
 
 def units_of(given: Sequence[str] | None) -> dict[str, str]:

@@ -61,8 +61,8 @@ def run(
             "-o",
             "--output",
             metavar="FILE",
-            help="File for the record, written during the run; a kill leaves an .h5 file as it is, "
-            "and of others FILE.partial.h5.",
+            help="File for the record, written during the run. After a kill, the samples are in "
+            "this file if it is .h5, otherwise in FILE.partial.h5.",
         ),
     ] = None,
     until: Annotated[
@@ -302,6 +302,6 @@ def _check_kept(output: Path | None, *, json: Path | None, report: Path | None) 
     if json is not None and json.suffix.lower() != ".json":
         raise ArgumentError(f"--json {json} must end in .json")
     if output is None and json is None and report is None:
-        raise ArgumentError("nothing would be kept of the run; name a file with -o")
+        raise ArgumentError("the run would not be saved; name a file with -o")
     if output is not None and output.suffix.lower() not in suffixes_of(Record):
         raise ArgumentError(f"-o {output} must end in one of {', '.join(suffixes_of(Record))}")

@@ -33,7 +33,7 @@ def table(
     ] = 1000.0,
     mode: Annotated[
         str,
-        typer.Option("--mode", metavar="P|PV|PVA", help="Commands that the servos take."),
+        typer.Option("--mode", metavar="P|PV|PVA", help="Commands sent to the servos."),
     ] = "P",
     load: Annotated[
         str,
@@ -82,8 +82,8 @@ def table(
 ) -> None:
     """Serve the simulated five-axis table, or a sensor, over UDP until Ctrl-C.
 
-    It checks every command against Fig. 4's limits, brakes when no command comes for the
-    watchdog's time, and comes to rest inside its limits.
+    It checks every command against Fig. 4's limits, brakes when no command arrives
+    within the watchdog's time, and comes to rest inside its limits.
     """
     from hmpim.experiment.priority import undelayed
     from hmpim.rigs import SkewedClock, SystemClock

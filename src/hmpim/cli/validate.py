@@ -69,7 +69,7 @@ def validate(
     to: To = None,
     sweep: Annotated[
         int | None,
-        typer.Option("--sweep", metavar="N", help="Take this sweep of several in a log."),
+        typer.Option("--sweep", metavar="N", help="Use this one of several sweeps in a log."),
     ] = None,
     stamps: StampChoice = Stamps.AUTO,
     sheet: Sheet = None,
@@ -86,7 +86,7 @@ def validate(
 
     if record is None and against is None:
         raise ArgumentError(
-            "there is nothing to hold the result against; give a RECORD, or --against OLD"
+            "there is nothing to compare the result with; give a RECORD, or --against OLD"
         )
     check_files(
         reads={"the result": result, "the record": record, "the older result": against},

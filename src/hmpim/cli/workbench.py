@@ -63,9 +63,9 @@ def workbench(
     from hmpim.workbench.server import Address, serve
 
     if not 0 <= port <= 65535:
-        raise ArgumentError(f"--port {port} is no port; give 0 to 65535")
+        raise ArgumentError(f"--port {port} is not a port; give 0 to 65535")
     if not max_upload > 0.0:
-        raise ArgumentError(f"--max-upload {max_upload:g} MB takes nothing; give a positive size")
+        raise ArgumentError(f"--max-upload {max_upload:g} MB allows no file; give a positive size")
     if not 0.0 < grace <= 60.0:
         raise ArgumentError(f"--grace {grace:g} s must be more than 0 and at most 60")
     if rig_file is not None:

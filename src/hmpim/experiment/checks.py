@@ -36,14 +36,14 @@ def check_rig(rig: object) -> Rig:
     --------
     >>> check_rig(abs)
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: <built-in function abs> is no rig: it has no name, ...
+    hmpim.errors.ArgumentError: <built-in function abs> is not a rig: it has no name, ...
     """
     if isinstance(rig, Rig) and not isinstance(rig, type):
         return rig
     wanted = ("name", "axes", "limits", "prepare", "play", "stop", "__enter__", "__exit__")
     missing = [name for name in wanted if not hasattr(rig, name)]
     raise ArgumentError(
-        f"{shown(rig)} is no rig: it has no {', '.join(missing) or 'instance'}; see "
+        f"{shown(rig)} is not a rig: it has no {', '.join(missing) or 'instance'}; see "
         "hmpim.rigs.Rig, and make a plain function one with FunctionRig(function=...)"
     )
 

@@ -58,14 +58,14 @@ class Feel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Felt:
-    """What was felt.
+    """The amplitude that a rig can be given.
 
     Parameters
     ----------
     share : float
-        Of the amplitude that limits and linearity allow; 1 for all of it.
+        Share of the stimulus's amplitude that limits and linearity allow; 1 for all of it.
     findings : tuple of Finding
-        Why it is less, or that it was felt at all.
+        Why it is less than 1, or that the rig was first moved at small amplitudes.
     """
 
     share: float
@@ -148,7 +148,7 @@ def _less(share: float, why: str) -> Felt:
         findings=(
             Finding(
                 code="felt",
-                message=f"Played at {100 * share:.3g} % of the amplitude asked for: {why}.",
+                message=f"Played at {100 * share:.3g} % of the requested amplitude: {why}.",
                 severity="info",
                 parameters=(),
             ),

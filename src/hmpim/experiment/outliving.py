@@ -181,7 +181,7 @@ class OutlivingRig:
         try:
             self._connection.send((what, value))
         except OSError as error:
-            raise RigError(f"the process that drives {self.name!r} is gone") from error
+            raise RigError(f"the process that drives {self.name!r} has ended") from error
 
     def _ask(self, what: str, value: object = None, *, seconds: float) -> Any:
         self._tell(what, value)
@@ -192,11 +192,11 @@ class OutlivingRig:
         try:
             if not self._connection.poll(seconds):
                 raise RigError(
-                    f"the process that drives {self.name!r} says nothing for {seconds:g} s"
+                    f"the process that drives {self.name!r} has not answered for {seconds:g} s"
                 )
             what, value = self._connection.recv()
         except (EOFError, OSError) as error:
-            raise RigError(f"the process that drives {self.name!r} is gone") from error
+            raise RigError(f"the process that drives {self.name!r} has ended") from error
         if what == "error":
             raise value
         return value

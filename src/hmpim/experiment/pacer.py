@@ -80,6 +80,6 @@ class Pacer:
             raise RigError(
                 f"command {number} is {late:.3g} s late, and {self._latest:g} s are allowed: this "
                 "computer paused, or the driver is slower than the stimulus's rate; the run was "
-                "ended, as all commands that are due would go at once"
+                "ended, because all overdue commands would otherwise be sent at once"
             )
         self._sent[number] = now

@@ -1,6 +1,6 @@
 """Four questions before a run: limits, error bars, independence, and the rig's answer.
 
-If all are answered with yes, the run is safe and its record will give what is asked for. The
+If the answer to all of them is yes, the run is safe and will reach the wanted accuracy. The
 first three move nothing; the last moves the rig at a small share of the amplitude.
 """
 

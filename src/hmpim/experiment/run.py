@@ -40,27 +40,28 @@ def run(
     Parameters
     ----------
     rig : Rig
-        The unit under test. It is entered here: give it as it is, not inside a `with`.
+        The unit under test. `run` connects to it; do not enter it with `with` yourself.
     stimulus : Stimulus, or mapping of axis to Stimulus, or sequence of Stimulus
-        What to play: one, or one for each axis that moves (a sequence goes by `Stimulus.axis`).
+        One stimulus, or one for each axis that moves (in a sequence, `Stimulus.axis` names it).
     path : path-like or None
-        File that keeps the record. One that ends in .h5 is written as samples come: killed at
-        any moment, all but the last half second can be read. Refused before anything moves if
-        it cannot be written.
+        File for the record. An .h5 file is written as samples arrive: if the process is killed,
+        all but the last half second can be read. A file that cannot be written is refused before
+        anything moves.
     rng : numpy.random.Generator, int or None
-        Source of what is random in a simulated unit, or its seed; None draws fresh.
+        Random generator of a simulated unit, or its seed; None gives a different run each time.
     limits : Limits, or mapping of axis to Limits, or None
-        To be kept beside the rig's own, whichever is smaller; the only ones if it states none.
+        Limits in addition to the rig's own; the smaller of the two applies. Needed if the rig
+        moves and states none.
     until : Until, callable or None
-        What must be known before the run may end: then what moves is led smoothly to rest, inside
-        the limits, and `Record.stopping` says so. Or called with every block that was played; a
-        string that it returns ends the run at once, and stands in the record as the reason.
+        Rule that ends the run early: the axis then comes smoothly to rest inside the limits, and
+        `Record.stopping` has the details. Or a callable that receives every block played; if it
+        returns a string, the run ends at once, and the record gives the string as the reason.
     subscribers : sequence of callable
-        Each is called with every block that was played. One that raises ends the run.
+        Each is called with every block that was played. An exception in one ends the run.
     log : RunLog or None
-        Takes each limit check, arm, stop and fault with its time.
+        Receives each limit check, arming, stop and fault with its time.
     options : RunOptions or None
-        Clock, what is watched, scheduling.
+        Clock, supervision and scheduling.
 
     Returns
     -------
@@ -70,7 +71,7 @@ def run(
     ------
     LimitsError
         If a true peak of the stimulus, between samples too, is beyond a limit of the rig, or
-        the rig moves and states none; the message says what would do.
+        the rig moves and states none; the message says what is enough.
     UnitError
         If the units of stimulus and limits cannot be compared.
     RigError
@@ -120,7 +121,8 @@ def _mapped(
         return stimulus
     if not isinstance(stimulus, Sequence) or not all(isinstance(s, Stimulus) for s in stimulus):
         raise ArgumentError(
-            f"{shown(stimulus)} is no Stimulus; make one with design(...) or Stimulus(waveform=...)"
+            f"{shown(stimulus)} is not a Stimulus; make one with design(...) or "
+            "Stimulus(waveform=...)"
         )
     axes = [s.axis for s in stimulus]
     if len(set(axes)) < len(axes) or (len(axes) > 1 and not all(axes)):

@@ -340,7 +340,7 @@ class Running:
             except BaseException as error:
                 self.log.add("fault", f"stop failed: {type(error).__name__}: {error}")
                 raise
-            self.log.add("stop", f"{self.rig.name} was told to stop")
+            self.log.add("stop", f"{self.rig.name} was commanded to stop")
 
     def _stop_after(self, cause: BaseException) -> None:
         """Stop the rig after a failure; where that fails, too, the cause is said first."""
@@ -350,7 +350,7 @@ class Running:
             why = _words(cause)
             more = "" if str(error) in why else f": {_words(error)}"
             raise RigError(
-                f"rig {self.rig.name!r} failed: {why}; then it could not be told to stop{more}"
+                f"rig {self.rig.name!r} failed: {why}; then it could not be stopped{more}"
             ) from cause
 
     @contextmanager

@@ -77,13 +77,13 @@ def pair_of(until: Until, layout: Layout) -> tuple[ChannelSpec, ChannelSpec]:
         if len(inputs) > 1 or len(outputs) > 1:
             raise ArgumentError(
                 f"the run has {len(inputs)} inputs and {len(outputs)} outputs; say which pair "
-                f"--until is about, output first; the channels are {known}"
+                f"--until refers to, output first; the channels are {known}"
             )
         return inputs[0], outputs[0]
     by_name = {spec.name: spec for spec in layout.channels}
     for name in until.pair:
         if name not in by_name:
-            raise ArgumentError(f"--until is about {name!r}, and the channels are {known}")
+            raise ArgumentError(f"--until refers to {name!r}, but the channels are {known}")
     output, source = until.pair
     return by_name[source], by_name[output]
 
@@ -132,7 +132,7 @@ class Sure:
         source, output = pair_of(until, layout)
         if len(stimuli) > 1:
             raise ArgumentError(
-                f"--until is for one axis at a time, and {', '.join(stimuli)} move together; run "
+                f"--until is for one axis at a time, but {', '.join(stimuli)} move together; run "
                 "them one after another"
             )
         self._until, self._stimuli, self._limits = until, dict(stimuli), dict(limits)

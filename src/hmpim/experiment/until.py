@@ -21,7 +21,7 @@ TARGETS = {
     "scale_factor": "",
     "bias": "",
 }
-"""What may be asked for, and its unit; that of scale factor and bias is the channels' own."""
+"""Parameters that may have a target, and their units; scale factor and bias: the channels' own."""
 
 _OWN = ("scale_factor", "bias")
 _LOOKS = 3  # in a row at which the rule must hold: study in docs/live.md
@@ -33,8 +33,9 @@ _EVERY = 0.05  # s between two looks
 class Until:
     """End a run as soon as these are known: each target is a standard deviation.
 
-    A run never ends before the whole band was passed once and answered, while one of these is
-    doubtful, or before the rule holds at several looks in a row.
+    A run never ends before the stimulus has covered the whole band once and the output has
+    responded, while one of these figures is doubtful, or before the rule holds at several looks
+    in a row.
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ class Until:
     natural_frequency : float, optional
         In Hz.
     damping_ratio, scale_factor, bias : float, optional
-        In the channels' own unit, where there is one.
+        In the channels' own unit, if they have one.
     relative : tuple of str
         Names of the targets that are shares of the estimate, 0.01 being 1 %.
     looks : int
@@ -51,12 +52,12 @@ class Until:
     every : float
         Seconds between two looks.
     pair : (str, str), optional
-        Names of output and input, as in ``result["y", "u"]``; needed where there are several.
+        Names of output and input, as in ``result["y", "u"]``; needed if there are several.
 
     Raises
     ------
     ArgumentError
-        If nothing is asked for, or a number is out of range.
+        If no target is given, or a number is out of range.
 
     Examples
     --------
@@ -77,7 +78,7 @@ class Until:
 
     def __post_init__(self) -> None:
         if not self.targets:
-            raise ArgumentError(f"nothing is asked for; give one of {', '.join(TARGETS)}")
+            raise ArgumentError(f"no target is given; give one of {', '.join(TARGETS)}")
         for name, value in (*self.targets.items(), ("every", self.every)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ArgumentError(f"{name} = {value!r} must be a positive, finite number")
@@ -86,7 +87,9 @@ class Until:
         object.__setattr__(self, "relative", tuple(self.relative))
         for name in self.relative:
             if name not in self.targets:
-                raise ArgumentError(f"relative = {name!r} is no target; those are {self._names()}")
+                raise ArgumentError(
+                    f"relative = {name!r} is not a target; those are {self._names()}"
+                )
 
     def __str__(self) -> str:
         return ",".join(
@@ -154,7 +157,8 @@ def until_of(text: str, *, pair: tuple[str, str] | None = None) -> Until:
         found = _PART.fullmatch(part)
         if found is None:
             raise ArgumentError(
-                f"--until {part!r} is no target; write one as delay=0.4ms or natural_frequency=1%"
+                f"--until {part!r} is not a target; write one as delay=0.4ms or "
+                "natural_frequency=1%"
             )
         name, number, unit = found.groups()
         if name not in TARGETS:
@@ -164,7 +168,7 @@ def until_of(text: str, *, pair: tuple[str, str] | None = None) -> Until:
         try:
             value = float(number)
         except ValueError:
-            raise ArgumentError(f"--until {part!r}: {number!r} is no number") from None
+            raise ArgumentError(f"--until {part!r}: {number!r} is not a number") from None
         if unit == "%":
             relative.append(name)
             asked[name] = value / 100.0

@@ -30,8 +30,8 @@ class Watch:
     stale : float or None
         Seconds of the run without a new sample of a measured position; None for any.
     late : float or None
-        Seconds by which a command of a rig that moves may go late: after a pause of the computer
-        those that are due would all go at once. None for any.
+        Seconds by which a command of a rig that moves may be sent late: after the computer has
+        paused, all overdue commands would be sent at once. None for any.
     answer : float or None
         Seconds after the last command of a block is due within which a rig that moves must return
         from `play`; None for any.
@@ -39,7 +39,7 @@ class Watch:
     Raises
     ------
     ArgumentError
-        If one of them is negative or no number.
+        If one of them is negative or not a number.
 
     Examples
     --------

@@ -192,7 +192,7 @@ def _check_rate(fs: float, channels: Sequence[Channel], file: str) -> None:
     rates = [rate_of(c.time) for c in channels]
     if all(abs(rate / fs - 1.0) > _APART for rate in rates):
         raise ArgumentError(
-            f"fs = {fs:g} Hz is given, and by its own time {file!r} was sampled at "
+            f"fs = {fs:g} Hz is given, but by its own time stamps {file!r} was sampled at "
             f"{rates[0]:.6g} Hz; leave fs out, or name another column as the time"
         )
 

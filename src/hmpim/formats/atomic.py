@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written beside their place, then moved into it.
+"""Files that are complete or absent: written to a temporary file, then moved into place.
 
 Every file that hmpim writes goes through `replacing`. The one exception is the record of a
 running test, which grows as it comes (`hmpim.formats.recording`). A process that is killed, or a
@@ -131,7 +131,7 @@ def check_writable(path: str | os.PathLike[str], *, size: int = 0) -> None:
             probe.unlink(missing_ok=True)
     if free < 1.05 * size:
         raise ArgumentError(
-            f"{os.fspath(path)!r} is going to take {_megabytes(size)} and its disk has "
+            f"{os.fspath(path)!r} needs {_megabytes(size)}, but its disk has only "
             f"{_megabytes(free)} left; make room, or name another folder"
         )
 
@@ -139,7 +139,7 @@ def check_writable(path: str | os.PathLike[str], *, size: int = 0) -> None:
 def _resolved(path: str | os.PathLike[str]) -> Path:
     """The file itself behind links, in a folder that exists."""
     if not str(path):
-        raise ArgumentError("'' is no file; name one")
+        raise ArgumentError("'' is not a file; name one")
     try:
         wanted = Path(path).resolve()
         if wanted.is_dir():

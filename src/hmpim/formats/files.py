@@ -52,12 +52,12 @@ def read(
         Name of the time channel. Without: time or t, in any case. In seconds unless its heading
         says otherwise, as ``time [ms]``.
     units : mapping of str to str, optional
-        Unit by channel name; goes before that of the file.
+        Unit by channel name; overrides that of the file.
     references, auxiliary : sequence of str, optional
-        Names of the channels that say what a loop was asked, and of those that are kept beside
-        and never fitted. Without: those that the file states.
+        Names of the channels that hold the command of a loop, and of those that are kept but
+        never fitted. Without: those that the file states.
     options : ReadOptions, optional
-        The part that is wanted, clocks that are off, files beside, and the like.
+        Part of the file to read, offsets of clocks, further files of the same test, and more.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def read(
         motions = _motions(runs)
         if not 1 <= options.sweep <= len(motions):
             raise ArgumentError(
-                f"sweep {options.sweep} is asked for, and {Path(path).name!r} has "
+                f"there is no sweep {options.sweep}: {Path(path).name!r} has "
                 f"{_told([m for _, m in motions])}"
             )
         run, motion = motions[options.sweep - 1]
@@ -107,7 +107,7 @@ def read(
     if len(runs) > 1:
         motions = _motions(runs)
         raise RecordError(
-            f"time starts again in {Path(path).name!r}: it holds {len(runs)} recordings with "
+            f"time starts again in {Path(path).name!r}: the file holds {len(runs)} recordings with "
             f"{_told([m for _, m in motions])}; choose one with --sweep N, or all with --sweep all"
         )
     return runs[0] if ours else _with_motions_said(runs[0])

@@ -16,18 +16,18 @@ class ReadOptions:
     Parameters
     ----------
     start, stop : float or None
-        Only what lies between, in s of the file's own time.
+        Only samples between these times, in s of the file's own time.
     sweep : int or None
         Only this motion of the first input, counted from 1 as `hmpim channels` lists them.
     offsets : mapping of str to float or None
-        By how much a clock is late, in s, by the name of a channel or of a file: so much is taken
-        off its stamps. None says that it is not known, which makes the delay doubtful.
+        How late a clock is, in s, by the name of a channel or of a file; it is subtracted from
+        the stamps. None states that it is unknown, which makes the delay doubtful.
     beside : sequence of path-like
         Other files that recorded the same test.
     common : str or None
-        Name of a channel that every file holds, by which their clocks are held together.
+        Name of a channel that every file contains, by which their clocks are aligned.
     stamps : {'auto', 'header', 'log'}
-        Which stamp counts where each message has two: the sender's or the logger's.
+        Stamp to use if each message has two: the sender's or the logger's.
     sheet : str or None
         Sheet of a workbook, or table of a file with several.
 

@@ -127,7 +127,7 @@ def find_runs(folder: str | PathLike[str]) -> Folder:
     """
     place = Path(folder)
     if not place.is_dir():
-        raise ArgumentError(f"{str(folder)!r} is no folder; name one that holds records")
+        raise ArgumentError(f"{str(folder)!r} is not a folder; name one that holds records")
     records: list[tuple[Path, Record, str, str]] = []
     results: list[tuple[Path, Identification]] = []
     unreadable: list[tuple[str, str]] = []
@@ -181,7 +181,7 @@ def filter_runs(runs: Sequence[Run], conditions: Sequence[str]) -> tuple[Run, ..
     >>> filter_runs([], ["speed > 3"])
     Traceback (most recent call last):
     ...
-    hmpim.errors.ArgumentError: 'speed > 3' asks for 'speed', which no run has; choose one of \
+    hmpim.errors.ArgumentError: 'speed > 3' uses 'speed', which no run has; choose one of \
 name, source, rig, input, output, verdict, created, fs, duration, samples, delay, ...
     """
     tests = [_condition(text) for text in conditions]
@@ -230,7 +230,9 @@ def _quantity(value: str, text: str) -> tuple[float, str]:
             raise ValueError(value)
         return float(match["number"]), match["unit"]
     except ValueError:
-        raise ArgumentError(f"{text!r}: {value!r} is no number; write it as 3ms or 0.003") from None
+        raise ArgumentError(
+            f"{text!r}: {value!r} is not a number; write it as 3ms or 0.003"
+        ) from None
 
 
 def _kind(path: Path) -> str:
@@ -322,7 +324,7 @@ def _parts(text: str) -> tuple[str, str, str]:
     """Name, sign and value of a condition."""
     match = _CONDITION.match(text)
     if match is None:
-        raise ArgumentError(f"{text!r} is no condition; write it as 'delay > 3ms'")
+        raise ArgumentError(f"{text!r} is not a condition; write it as 'delay > 3ms'")
     return match["name"], match["sign"], match["value"]
 
 
@@ -333,8 +335,7 @@ def _condition(text: str) -> Callable[[Run], bool]:
     if name in _FIGURES:
         return _of_figures(name, sign, value, text)
     raise ArgumentError(
-        f"{text!r} asks for {name!r}, which no run has; choose one of "
-        f"{', '.join((*_WORDS, *_FIGURES))}"
+        f"{text!r} uses {name!r}, which no run has; choose one of {', '.join((*_WORDS, *_FIGURES))}"
     )
 
 

@@ -215,9 +215,9 @@ def _read_result(path: Path) -> Identification:
     except (FormatError, ArgumentError) as error:
         raise FormatError(f"{str(path)!r}: {error}") from None
     except KeyError as error:
-        raise FormatError(f"{str(path)!r} is not a whole result: {error} is missing") from error
+        raise FormatError(f"{str(path)!r} is not a complete result: {error} is missing") from error
     except (TypeError, ValueError, AttributeError) as error:
-        raise FormatError(f"{str(path)!r} is not a whole result: {error}") from error
+        raise FormatError(f"{str(path)!r} is not a complete result: {error}") from error
     return result
 
 
@@ -239,7 +239,8 @@ def _check_covariance(pair: PairIdentification) -> None:
         return
     if found.ndim != 2 or found.shape[0] != found.shape[1] or not np.isfinite(found).all():
         raise FormatError(
-            f"the covariance of {pair.output!r} from {pair.input!r} is no square of finite numbers"
+            f"the covariance of {pair.output!r} from {pair.input!r} is not a square "
+            "matrix of finite numbers"
         )
 
 
@@ -260,7 +261,7 @@ def _read_stimulus(path: Path) -> Stimulus:
     if path.suffix.lower() != ".toml" and path.suffix.lower() in STIMULUS_SUFFIXES:
         raise FormatError(
             f"{str(path)!r} holds the samples of a stimulus, of which the stimulus itself cannot "
-            "be made again; save it as .toml, or read the samples with "
+            "be restored; save it as .toml, or read the samples with "
             "hmpim.formats.stimulus_files.read_stimuli"
         )
     found = read_stimulus_toml(path)

@@ -223,7 +223,7 @@ def save_stimulus_c(stimuli: _Several, path: str | PathLike[str]) -> None:
 
 
 def read_stimulus(path: str | PathLike[str]) -> list[Stimulus] | list[PlayedStimulus]:
-    """Read stimuli back: whole ones from TOML, samples from CSV, HDF5, MAT or a C header.
+    """Read stimuli back: complete ones from TOML, samples from CSV, HDF5, MAT or a C header.
 
     Parameters
     ----------
@@ -421,7 +421,8 @@ def _refuse_cut(path: Path, rows: Sequence[str], comment: str) -> None:
     samples = len(rows) - 1 if stated is None else int(stated[1])
     if not len(whole) == len(rows) - 1 == samples:
         raise FormatError(
-            f"{str(path)!r} is damaged: {len(whole)} of its {samples} samples are whole; copy it "
+            f"{str(path)!r} is damaged: {len(whole)} of its {samples} samples are "
+            "complete; copy it "
             "again, or save the stimulus anew"
         )
 

@@ -113,7 +113,7 @@ def _table(name: str, value: Any) -> list[str]:
     if not isinstance(value, Limits):
         kind = type(value).__name__
         if _TYPES.get(kind) is not type(value):
-            raise ArgumentError(f"a {kind} is no waveform of this package and cannot be saved")
+            raise ArgumentError(f"a {kind} is not a waveform of this package and cannot be saved")
         lines.append(f'type = "{kind}"')
     for field in fields(value):
         part = getattr(value, field.name)
@@ -258,7 +258,7 @@ def _made(table: Any, name: str) -> Stimulus:
 def _waveform(table: dict[str, Any]) -> Any:
     kind = table["type"]
     if kind not in _TYPES:
-        raise FormatError(f"type = {kind!r} is no waveform; known are {', '.join(_TYPES)}")
+        raise FormatError(f"type = {kind!r} is not a waveform; known are {', '.join(_TYPES)}")
     arguments: dict[str, Any] = {}
     for name, value in table.items():
         if isinstance(value, dict):

@@ -156,7 +156,7 @@ def open_logs(
         for log in logs:
             if find_channel(common, log.contents) is None:
                 raise FormatError(
-                    f"{log.path.name!r} has no column {common!r}, which is to hold the clocks "
+                    f"{log.path.name!r} has no column {common!r}, which is to align the clocks "
                     f"together; its columns are {listed([c.name for c in log.contents.channels])}"
                 )
     places: dict[str, tuple[int, str]] = {}
@@ -224,7 +224,7 @@ def _moved(series: Sequence[Series], late: float | None) -> tuple[Series, ...]:
 
 def _channel(series: Series) -> Channel:
     if series.time is None:
-        raise RecordError(f"{series.name!r} has no time, so it tells nothing of a clock")
+        raise RecordError(f"{series.name!r} has no time, so its clock cannot be aligned")
     return mend([series]).channels[0]
 
 

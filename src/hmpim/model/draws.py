@@ -46,7 +46,7 @@ def with_coefficients(model: Model, vector: NDArray[np.float64]) -> Model:
     numerator = vector[1:above]
     lowest = (1.0, 0.0) if model.denominator[-1] == 0.0 else (1.0,)
     if not numerator.any():
-        raise ArgumentError("a scale factor of 0 is no model")
+        raise ArgumentError("a scale factor of 0 is not a model")
     scale = float(numerator[np.flatnonzero(numerator)[-1]])
     return replace(
         model,

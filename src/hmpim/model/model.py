@@ -368,7 +368,7 @@ def simulate(
     [1.0, 1.0, 1.0, 3.0]
     """
     if not (np.isfinite(fs) and fs > 0):
-        raise ArgumentError(f"fs = {fs:g} Hz is no sampling rate; give a positive number of Hz")
+        raise ArgumentError(f"fs = {fs:g} Hz is not a sampling rate; give a positive number of Hz")
     if model.intersample == "sampled" or intersample == "sampled":
         return _run(replace(model, fs=fs, intersample="sampled"), numbers_of("u", u), rng)
     samples = np.atleast_1d(numbers_of("u", u))

@@ -126,7 +126,7 @@ class NonlinearPart:
 
     def __post_init__(self) -> None:
         if self.kind not in KIND_WORDS or self.kind == "saturation":
-            raise ArgumentError(f"kind = {self.kind!r} is no nonlinearity that a model can have")
+            raise ArgumentError(f"kind = {self.kind!r} is not a nonlinearity that a model can have")
         signed = self.kind in ("asymmetry", "curvature")
         if not np.isfinite(self.size) or (self.size <= 0.0 and not signed):
             raise ArgumentError(f"size = {self.size!r} of {self.words} must be more than 0")

@@ -81,7 +81,7 @@ def needed_gain(position: FloatArray, wish: Wish, *, finer: int = 1) -> float:
     Returns
     -------
     float
-        Infinite if the stimulus does not tell the parameters apart.
+        Infinite if the stimulus does not distinguish the parameters.
     """
     worst = 0.0
     for model in wish.models(finer=finer):

@@ -1,4 +1,4 @@
-r"""What a stimulus will tell: Fisher information, and the error bars it allows.
+r"""How accurate an identification will be: Fisher information, and the error bars it allows.
 
 With white noise of standard deviation σ the information on the parameters is JᵀJ/σ², J the
 derivatives of the noise-free output (L. Ljung, System Identification, 2nd ed., 1999, section

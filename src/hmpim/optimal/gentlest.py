@@ -43,7 +43,7 @@ _ROOM = 1.05  # on what would do: another search may end in another, slightly wo
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gentlest:
-    """The gentlest stimulus found, what it will tell, and what the other families cost.
+    """The gentlest stimulus found, its predicted errors, and the cost of the other families.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def gentlest(
     noise_std : float
         Standard deviation of white measurement noise, in the output's unit.
     limits : Limits
-        What the axis may do; never left.
+        Limits of the axis, which are always kept.
     fs : float
         Sampling rate, Hz.
     gentle : {'peak_acceleration', 'rms_acceleration', 'travel', 'duration'}
@@ -137,7 +137,7 @@ def gentlest(
     ------
     LimitsError
         If no stimulus of these families meets the accuracy inside the limits; the message
-        says what would do.
+        says what is needed.
     ArgumentError
         If something else is out of range.
 

@@ -192,7 +192,7 @@ class Accuracy:
             if value is not None:
                 _positive(f"accuracy of {name}", value)
         if all(value is None for _, value in given):
-            raise ArgumentError("no accuracy is asked for; give one of " + ", ".join(PARAMETERS))
+            raise ArgumentError("no accuracy is given; give one of " + ", ".join(PARAMETERS))
 
     def std(self, model: RoughModel) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         """Wanted standard deviations in the order of `PARAMETERS`, infinite where any will do.
@@ -349,7 +349,8 @@ class Wish:
         highest = max(m.natural_frequency for m in self.models())
         if highest > 0.3 * self.fs:
             raise ArgumentError(
-                f"natural_frequency up to {highest:g} Hz is not seen at fs = {self.fs:g} Hz; "
+                f"natural_frequency up to {highest:g} Hz cannot be observed at fs = "
+                f"{self.fs:g} Hz; "
                 f"sample at {math.ceil(highest / 0.3):g} Hz or faster"
             )
 

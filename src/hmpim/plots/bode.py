@@ -60,7 +60,7 @@ def bode(
         several pairs, their measured responses over each other. Curves are drawn in this
         order; one that has a band is drawn with it.
     marks : sequence of Mark
-        Frequencies to name beside curves.
+        Frequencies to label next to curves.
     magnitude_unit : str
         Output unit per input unit, that 0 dB stands for; empty if they are the same.
     band : tuple of float, optional

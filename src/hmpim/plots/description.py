@@ -309,7 +309,7 @@ class Figure:
         Raises
         ------
         ArgumentError
-            If the name's ending is no format of a picture.
+            If the name's ending is not a format of a picture.
 
         Examples
         --------

@@ -334,8 +334,8 @@ def _folded(channel: Channel, own: Clock, first: Channel, clock: Clock) -> list[
             code="folded",
             message=(
                 f"{100 * share:.2g} % of the power of {channel.name!r} lies above "
-                f"{clock.fs / 2:.6g} Hz, half the rate of {first.name!r}: the answer to it is "
-                "folded onto lower frequencies there, as noise; record the output faster, or "
+                f"{clock.fs / 2:.6g} Hz, half the rate of {first.name!r}: the response to it is "
+                "aliased to lower frequencies there, as noise; record the output faster, or "
                 "sweep lower"
             ),
             severity="info",

@@ -75,7 +75,7 @@ class Channel(ByValue):
             if bad.size:
                 raise RecordError(
                     f"channel {label!r} holds {array[bad[0]]} at sample {bad[0]} "
-                    f"({bad.size} such in all); cut them out or fill them before identifying"
+                    f"({bad.size} in all); cut them out or fill them before identifying"
                 )
         with np.errstate(over="ignore", invalid="ignore"):
             step = np.diff(time - time[0])  # stamps of a damaged file may lie too far apart to tell

@@ -378,7 +378,7 @@ def _check_not_restarted(time: NDArray[np.float64], of: str) -> None:
         k = int(starts[0])
         raise RecordError(
             f"time of {of} starts again at sample {k}: {time[k - 1]:.9g} s is followed by "
-            f"{time[k]:.9g} s ({starts.size} such in all); the file holds several recordings: "
+            f"{time[k]:.9g} s ({starts.size} in all); the file holds several recordings: "
             "choose a sweep with --sweep, or cut the file there"
         )
 

@@ -165,7 +165,7 @@ def _refined(
         at = t1 + offset + drift * (t1 - middle)
         both = (at >= t2[0]) & (at <= t2[-1])
         if np.count_nonzero(both) < 8:
-            raise RecordError("the two recordings overlap too little to be held together")
+            raise RecordError("the two recordings overlap too little to be aligned")
         y, x, late = x1[both], curve(at[both]), t1[both] - middle
         # The scale as the ratio of sizes: noise on x would make a fitted one too small.
         correlation = float(np.corrcoef(x, y)[0, 1])

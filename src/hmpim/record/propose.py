@@ -172,7 +172,7 @@ def _idle(channel: Channel) -> str | None:
     if not span < _ABSURD:
         return f"reaches {np.abs(values).max():.3g}, which no signal does; samples are damaged"
     if not np.isfinite(span) or span <= 1e-12 * float(np.abs(values).max()):
-        return f"reads {values[0]:.6g} from end to end"
+        return f"always reads {values[0]:.6g}"
     steps = np.diff(values)
     if float(np.ptp(steps)) <= 1e-6 * abs(float(np.median(steps))):
         return "counts up evenly, as an index or a time does"

@@ -101,7 +101,7 @@ def clock_findings(
                 code="rate",
                 message=(
                     f"time stamps{of} run at {clock.fs:.6g} Hz where {stated:.6g} Hz is stated; "
-                    "the stamps are believed: correct the rate, or the unit of the time column"
+                    "the stamps are used: correct the rate, or the unit of the time column"
                 ),
                 severity="info",
                 parameters=(),
@@ -175,7 +175,8 @@ def inspect_values(record: Record) -> tuple[Finding, ...]:
                 Finding(
                     code="dead_channel",
                     message=(
-                        f"channel {channel.name!r} reads {channel.values[0]:.6g} from end to end; "
+                        f"channel {channel.name!r} is {channel.values[0]:.6g} from "
+                        "beginning to end; "
                         "check its cable, its range and its column"
                     ),
                     severity="info",

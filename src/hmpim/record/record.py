@@ -377,7 +377,8 @@ def _by_name(name: str, given: Mapping[str, ArrayLike] | ArrayLike) -> Mapping[s
         return given
     if given is None or isinstance(given, (str, bytes)) or np.ndim(given) == 0:
         raise ArgumentError(
-            f"{shown(given)} is no channel; give samples by name, such as {{{name!r}: [0.0, 1.0]}}"
+            f"{shown(given)} is not a channel; give samples by name, such as "
+            f"{{{name!r}: [0.0, 1.0]}}"
         )
     return {name: given}
 
@@ -386,7 +387,7 @@ def _rising(band: tuple[float, float]) -> tuple[float, float]:
     low, high = map(float, band)
     if not 0.0 <= low <= high < np.inf:  # one line alone is a band, too
         raise ArgumentError(
-            f"band = ({low:g}, {high:g}) Hz is no band; give the lower frequency first, such as "
+            f"band = ({low:g}, {high:g}) Hz is not a band; give the lower frequency first, such as "
             "(0.1, 20)"
         )
     return low, high

@@ -55,7 +55,7 @@ def hand_notes(
     known = {words.name: words for words in GLOSSARY}
     for name, value in hand.items():
         if name not in known:
-            raise ArgumentError(f"{name!r} is no parameter; choose one of {', '.join(known)}")
+            raise ArgumentError(f"{name!r} is not a parameter; choose one of {', '.join(known)}")
         found = getattr(pair.parameters, name)
         unit = "Hz" if name in _FREQUENCIES else "s" if "delay" in name else ""
         unit = unit if found is None else found.unit

@@ -49,7 +49,7 @@ def report(
     about : About, optional
         Title, unit under test, test, operator, date.
     truth : mapping of str to float, optional
-        True values by the parameters' names, shown beside the estimates where they are known.
+        True values by the parameters' names, shown next to the estimates if they are known.
     stimulus : Stimulus, optional
         What was sent, to be shown inside its limits.
     notes : sequence of str

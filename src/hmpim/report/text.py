@@ -42,7 +42,7 @@ def parameter_table(
     pair : PairIdentification
         What was found.
     truth : mapping of str to float, optional
-        True values by parameter name, where they are known; shown beside the estimates.
+        True values by parameter name, if they are known; shown next to the estimates.
 
     Examples
     --------

@@ -13,7 +13,7 @@ __all__ = ["Clock", "ManualClock", "SkewedClock", "SystemClock"]
 
 
 class Clock(Protocol):
-    """Something that tells the time and waits."""
+    """A source of time that can also wait."""
 
     def now(self) -> float:
         """Seconds; they never go back."""
@@ -47,7 +47,7 @@ class SystemClock:
 
 
 class ManualClock:
-    """A clock that jumps where it is asked to wait: a run of an hour takes no time.
+    """A clock that jumps ahead instead of waiting: a run of an hour takes no time.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class SkewedClock:
     Raises
     ------
     ArgumentError
-        If offset or drift is no finite number, or the clock would stand still or run backwards.
+        If offset or drift is not a finite number, or the clock would stand still or run backwards.
 
     Examples
     --------

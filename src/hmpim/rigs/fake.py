@@ -1,4 +1,4 @@
-"""A rig for people's own tests: it answers as it is told to, and remembers what was done to it."""
+"""A rig for your own tests: it gives the answers that you set, and records the calls made to it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ __all__ = ["FakeRig"]
 
 @dataclass(kw_only=True)
 class FakeRig:
-    """A rig that answers each block with ``answer(block)`` and notes each call in `told`.
+    """A rig that answers each block with ``answer(block)`` and records each call in `told`.
 
     Examples
     --------

@@ -30,20 +30,20 @@ class FunctionRig(Simulated):
     Parameters
     ----------
     function : callable
-        Takes what `mode` says and returns as much.
+        Called as `mode` states; returns as many numbers as it receives.
     mode : {'array', 'sample'}
-        'array': called once with all samples, shape (n,). 'sample': called with one float
-        after the other, in order, as an algorithm with a memory is in service.
+        'array': called once with all samples, shape (n,). 'sample': called once per sample
+        with a float, in order, as an algorithm with an internal state is in service.
     reset : callable or None
-        Called before each run, to bring an algorithm with a memory back to its start.
+        Called before each run, to reset an algorithm with an internal state.
     measures : {'position', 'velocity', 'acceleration'}
         Which quantity of the motion is fed.
     output_unit : str or None
-        None takes the input's.
+        None: the input's.
     intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
-        What the record says of the input between samples. None, the default, says 'sampled' of
-        an algorithm that is called sample by sample, and leaves it open of one that sees all
-        samples at once, as it may look ahead.
+        What the record states about the input between samples. None, the default, states
+        'sampled' for mode 'sample', and nothing for mode 'array', since the function may look
+        ahead.
     name, input_name, output_name : str
         Name of the rig, and of its record's channels.
     limits : Limits or None
@@ -148,7 +148,7 @@ class FunctionRig(Simulated):
         if bad.size:
             raise RigError(
                 f"{self.name!r} returned {values[bad[0]]} at sample {first + bad[0]}, for the "
-                f"input {fed[bad[0]]:.6g} ({bad.size} such in all); make it return finite numbers"
+                f"input {fed[bad[0]]:.6g} ({bad.size} in all); make it return finite numbers"
             )
         return values
 
@@ -156,5 +156,5 @@ class FunctionRig(Simulated):
 def _real(answer: Any) -> Any:
     """Return the answer; numpy would take None for nan, and drop an imaginary part."""
     if answer is None or isinstance(answer, complex):
-        raise TypeError(f"it returned {answer!r}, which is no real number")
+        raise TypeError(f"it returned {answer!r}, which is not a real number")
     return answer

@@ -133,10 +133,10 @@ def find_ticks(text: str) -> UdpTicks | SerialTicks:
     --------
     >>> find_ticks("sundial")
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: 'sundial' is no tick; write udp://HOST:PORT or serial:PORT
+    hmpim.errors.ArgumentError: 'sundial' is not a tick; write udp://HOST:PORT or serial:PORT
     """
     if text.startswith("udp://"):
         return UdpTicks(*parse_address(text.removeprefix("udp://")))
     if text.startswith("serial:"):
         return SerialTicks(text.removeprefix("serial:"))
-    raise ArgumentError(f"{text!r} is no tick; write udp://HOST:PORT or serial:PORT")
+    raise ArgumentError(f"{text!r} is not a tick; write udp://HOST:PORT or serial:PORT")

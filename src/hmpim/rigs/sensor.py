@@ -142,7 +142,7 @@ class Sensor(Simulated):
         if self.time_constant is not None and self.natural_frequency is not None:
             raise ArgumentError(
                 f"time_constant = {self.time_constant!r} s and natural_frequency = "
-                f"{self.natural_frequency!r} Hz are two kinds of dynamics; give one of them"
+                f"{self.natural_frequency!r} Hz are two kinds of dynamics; give only one of them"
             )
         low, high = self.saturation_low, self.saturation_high
         if low is not None and high is not None and low >= high:

@@ -62,7 +62,8 @@ def stimuli_by_axis(
     for axis, stimulus in stimuli.items():
         if not isinstance(stimulus, Stimulus):
             raise ArgumentError(
-                f"{shown(stimulus)} for axis {axis!r} is no Stimulus; make one with design(...) or "
+                f"{shown(stimulus)} for axis {axis!r} is not a Stimulus; make one with "
+                "design(...) or "
                 "Stimulus(waveform=...)"
             )
     if not stimuli:

@@ -1,8 +1,8 @@
 """An external tick as the clock of a run, such as an interrupt that is locked to GPS.
 
-Each pulse is a datagram or a byte, and should hold its number (`hmpim.rigs.pulses`): then one that
-is lost, doubled or late is known at once. Between two pulses the computer's clock is read, at the
-pace that the pulses have shown so far.
+Each pulse is a datagram or a byte, and should contain its number (`hmpim.rigs.pulses`), so that a
+pulse that is lost, duplicated or late is detected at once. Between two pulses the time comes from
+the computer's clock, corrected by the rate measured so far.
 """
 
 import threading

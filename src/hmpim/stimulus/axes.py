@@ -1,4 +1,4 @@
-"""Several axes at once: stimuli that one record can tell apart, and how well it can.
+"""Several axes at once: stimuli that one record can distinguish, and how well it can.
 
 At each frequency a record of several axes is a set of linear equations, one for each
 neighbouring bin of the spectra. Stimuli that pass a frequency at different times turn their
@@ -67,7 +67,7 @@ class AxisPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InputCondition:
-    """How well stimuli can be told apart, over frequency.
+    """How well stimuli can be distinguished, over frequency.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class InputCondition:
         Condition number of the input spectra, each scaled to the same power, over the
         neighbouring bins; infinite where an axis is not excited.
     bound : float
-        Up to which a frequency is declared usable.
+        Largest condition number at which a frequency counts as usable.
     """
 
     names: tuple[str, ...]
@@ -107,7 +107,7 @@ def design_axes(
     method: Literal["sweeps", "multisines"] = "sweeps",
     tail: float = 0.5,
 ) -> tuple[Stimulus, ...]:
-    """Design stimuli for several axes that one record can tell apart.
+    """Design stimuli for several axes that one record can distinguish.
 
     Parameters
     ----------
@@ -380,7 +380,7 @@ def _refuse_same(u: FloatArray, labels: tuple[str, ...]) -> None:
 
 
 def condition_table(found: InputCondition) -> str:
-    """Say in a few lines how well axes are told apart, octave by octave.
+    """Say in a few lines how well axes can be distinguished, octave by octave.
 
     Examples
     --------

@@ -174,7 +174,7 @@ class SumOfSines:
         if count == 0 or len(self.amplitudes) != count or len(self.phases) not in (0, count):
             raise ArgumentError(
                 f"{len(self.amplitudes)} amplitudes, {count} frequencies and {len(self.phases)} "
-                "phases do not go together; give as many of each"
+                "phases do not match; give as many of each"
             )
         for amplitude in self.amplitudes:
             _check_size("amplitude", amplitude)

@@ -126,7 +126,7 @@ def leave_room(limits: Limits, *, resolution: float, fs: float) -> Limits:
     Raises
     ------
     LimitsError
-        If rounding alone reaches a limit; the message says which resolution would do.
+        If rounding alone reaches a limit; the message says which resolution is enough.
 
     Examples
     --------

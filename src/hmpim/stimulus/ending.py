@@ -41,9 +41,9 @@ def left_early(
 ) -> Stimulus:
     """Return the stimulus left for rest after some of its samples.
 
-    Up to there it is the same. Then a polynomial of fifth degree takes the axis from where it is
-    to rest at its middle, the gentlest that keeps the limits; the tail at rest follows. Where no
-    such way exists, the stimulus is left a little later.
+    Up to there it is the same. Then the gentlest polynomial of fifth degree inside the limits
+    brings the axis to rest at position 0; the tail at rest follows. If no such path exists, the
+    stimulus is left a little later.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def design(
     Raises
     ------
     LimitsError
-        If limits, band and ratio cannot all be met; the message says what would do.
+        If limits, band and ratio cannot all be met; the message says what is enough.
     ArgumentError
         For anything else that is out of range.
 
@@ -294,7 +294,7 @@ def _check_frequencies(low: float, high: float, length: float, rate: float) -> N
     if cycles < 1.0 - 1e-9:
         raise LimitsError(
             f"band = ({low:g}, {high:g}) Hz makes {cycles:.3g} cycles in {length:g} s, "
-            f"and one is needed; a duration of {three_digits(length / cycles, up=True)} s would do"
+            f"and one is needed; a duration of {three_digits(length / cycles, up=True)} s is enough"
         )
 
 

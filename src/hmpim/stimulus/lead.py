@@ -244,7 +244,7 @@ def rest_to_rest(
     Raises
     ------
     LimitsError
-        If no lead of that length fits; the message says what would do.
+        If no lead of that length fits; the message says what is enough.
     ArgumentError
         If the core has no band, as a step.
 
@@ -364,7 +364,7 @@ def _no_lead(core: Waveform, which: str, limits: Limits, longest: float, fs: flo
     )
     return (
         f"lead = {longest:g} s is too short to keep the limits; "
-        f"lead = {three_digits(needed, up=True)} s would do, or lead='auto'"
+        f"lead = {three_digits(needed, up=True)} s is enough, or lead='auto'"
     )
 
 

@@ -74,7 +74,7 @@ class Multisine:
         if count == 0 or len(self.amplitudes) != count or len(self.phases) != count:
             raise ArgumentError(
                 f"{count} frequencies, {len(self.amplitudes)} amplitudes and {len(self.phases)} "
-                "phases do not go together; give as many of each"
+                "phases do not match; give as many of each"
             )
         if not np.all(np.diff((0.0, *self.frequencies)) > 0.0):
             raise ArgumentError(
@@ -283,7 +283,7 @@ def interleaved_multisines(
     """
     if len(bands) != len(limits) or not bands:
         raise ArgumentError(
-            f"{len(bands)} bands and {len(limits)} limits do not go together; give one of each "
+            f"{len(bands)} bands and {len(limits)} limits do not match; give one of each "
             "for each axis"
         )
     axes = list(zip(bands, limits, strict=True))
@@ -321,7 +321,7 @@ def _lines(
         raise LimitsError(
             f"band = ({low:g}, {high:g}) Hz holds no line of a multisine of {period:g} s that "
             f"takes one multiple of {1.0 / period:g} Hz in {every}; a duration of "
-            f"{three_digits(needed, up=True)} s would do"
+            f"{three_digits(needed, up=True)} s is enough"
         )
     frequency = numbers / period
     return frequency, largest_sine(frequency, limits)

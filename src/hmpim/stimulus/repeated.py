@@ -83,7 +83,7 @@ class Repeated:
             needed = three_digits(2.0 / (low + high), up=True)
             raise ArgumentError(
                 f"sweep = {self.sweep:g} s from {low:g} to {high:g} Hz makes less than one cycle; "
-                f"{needed} s would do"
+                f"{needed} s is enough"
             )
 
     @property

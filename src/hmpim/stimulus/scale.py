@@ -17,7 +17,7 @@ W = TypeVar("W", bound=Waveform)
 
 
 def check_limits_given(limits: Limits) -> None:
-    """Refuse what is no `Limits`, or bounds nothing.
+    """Refuse anything but `Limits` with at least one finite limit.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Is the spectrum strong enough? Signal-to-noise ratio at each frequency, and what would do.
+"""Is the spectrum strong enough? Signal-to-noise ratio at each frequency, and what is enough.
 
 The ratio at f is that of the energy of the stimulus's DFT to that of the noise in the same
 resolution r (Hz), each averaged over a sixth of an octave or a few lines:
@@ -76,7 +76,7 @@ class OverFrequency:
         object.__setattr__(self, "value", value)
         if not frequency or len(frequency) != len(value):
             raise ArgumentError(
-                f"{len(frequency)} frequencies and {len(value)} values do not go together"
+                f"{len(frequency)} frequencies and {len(value)} values do not match"
             )
         if not (np.all(np.diff((0.0, *frequency)) > 0) and np.all(np.isfinite(frequency + value))):
             raise ArgumentError(
@@ -281,7 +281,7 @@ def check_spectrum(
     ------
     LimitsError
         If it is below what is wanted somewhere; the message says where it is weakest, which
-        limit binds there and what would do.
+        limit binds there and what is enough.
     ArgumentError
         If an argument is out of range.
 
@@ -342,7 +342,7 @@ def check_spectrum(
     raise LimitsError(
         f"at {frequency:.4g} Hz the signal-to-noise ratio is {found.decibel[worst]:.1f} dB in "
         f"{found.resolution:.3g} Hz, below the {wanted[worst]:g} dB wanted; {which}"
-        f"{', or '.join(advice)} would do"
+        f"{', or '.join(advice)} is enough"
     )
 
 

@@ -199,7 +199,7 @@ class Stimulus(ByValue):
         ------
         LimitsError
             If the rounded commands, or their differences over the sampling interval, go beyond
-            a limit; the message says what would do.
+            a limit; the message says what is enough.
 
         Examples
         --------

@@ -45,7 +45,7 @@ class Campaigns:
             If another one goes on, or the plan is wrong.
         """
         if self.running:
-            raise ArgumentError("a campaign goes on; stop it first")
+            raise ArgumentError("a campaign is in progress; stop it first")
         checked_plan(text)
         self.folder = self._settings.runs / harmless_name(name or "campaign")
         context = process_context()

@@ -121,7 +121,7 @@ class Lock:
             return
         stated = _by_name(scope).get("content-length", "0")
         if not (stated.isascii() and stated.isdigit()):
-            await _refuse(scope, send, 400, "content-length is no number")
+            await _refuse(scope, send, 400, "content-length is not a number")
             return
         if int(stated) > self._largest:
             await _refuse(scope, send, 413, self._too_large)

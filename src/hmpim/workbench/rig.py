@@ -130,7 +130,7 @@ class RigBench:
         """
         with self._lock:
             if self._running:
-                raise RigError("a run goes on; wait until it has ended, or stop it")
+                raise RigError("a run is in progress; wait until it has ended, or stop it")
             if self.owner and self.owner != desk:
                 raise RigError("another window has armed a rig; disarm it there first")
             described_rig(self._settings, rig)
@@ -167,7 +167,7 @@ class RigBench:
         """
         with self._lock:
             if self._running:
-                raise RigError("a run goes on already; a second one is not started")
+                raise RigError("a run is already in progress; a second one is not started")
             if not self.owner or self.owner != desk:
                 raise RigError("this window has not armed the rig; arm it first")
             folder = self._fresh_folder("check" if questions is not None else "")

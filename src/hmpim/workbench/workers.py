@@ -77,7 +77,7 @@ class Workers:
                 self.stop()
                 self.start()
             raise HmpimError(
-                "the process that worked on it ended, perhaps for want of memory; try again"
+                "the process that worked on it ended, perhaps for lack of memory; try again"
             ) from error
 
 

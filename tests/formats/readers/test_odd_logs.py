@@ -92,7 +92,9 @@ def test_a_rate_that_the_file_s_time_contradicts_is_refused(kind, tmp_path):
         np.savetxt(path, np.c_[T, U, Y], delimiter=",", header="t,u,y", comments="")
     else:
         parquet(path, t=T, u=U, y=Y)
-    with pytest.raises(ArgumentError, match="fs = 100 Hz is given, and by its own time 'run' was"):
+    with pytest.raises(
+        ArgumentError, match="fs = 100 Hz is given, but by its own time stamps 'run' was"
+    ):
         read(path, fs=100.0)
     assert_delay(read(path, fs=samples.FS))
 

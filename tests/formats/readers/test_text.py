@@ -337,7 +337,7 @@ def test_damage_is_said_with_its_place(tmp_path, content, words):
 def test_a_unit_that_is_none_of_time(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time [deg],u,y\n0,1,2\n1,2,3\n")
-    with pytest.raises(UnitError, match=r"'a\.csv', column 'time \[deg\]': 'deg' is no unit"):
+    with pytest.raises(UnitError, match=r"'a\.csv', column 'time \[deg\]': 'deg' is not a unit"):
         read(path)
 
 

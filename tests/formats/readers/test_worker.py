@@ -126,7 +126,7 @@ def test_several_threads_take_turns(ask):
 @pytest.mark.parametrize("text", ["much", "-1", "0", "nan"])
 def test_a_limit_that_is_none_is_refused(ask, monkeypatch, text):
     monkeypatch.setenv("HMPIM_READER_MEMORY", text)
-    with pytest.raises(ArgumentError, match=r"HMPIM_READER_MEMORY=.* is no positive number"):
+    with pytest.raises(ArgumentError, match=r"HMPIM_READER_MEMORY=.* is not a positive number"):
         ask("-")
 
 

@@ -145,8 +145,8 @@ def test_what_has_no_reference_or_two_inputs_is_refused():
     two = hmpim.Record.from_arrays(
         {"a": SWEEP, "b": SWEEP[::-1].copy()}, {"y": SWEEP}, references={"r": SWEEP}, fs=FS
     )
-    with pytest.raises(ArgumentError, match="takes a record of one input; this one has 2"):
+    with pytest.raises(ArgumentError, match="requires a record of one input; this one has 2"):
         hmpim.identify(two, reference="r")
     statistics = hmpim.compress(record, lags=100)
-    with pytest.raises(ArgumentError, match="statistics keep no reference"):
+    with pytest.raises(ArgumentError, match="statistics contain no reference"):
         hmpim.identify(statistics, reference="r")

@@ -73,7 +73,7 @@ def test_what_cannot_be_compressed_is_said():
     assert compress(two, channels=("a", "y"), lags=4).names == ("a", "y")
     with pytest.raises(HmpimError, match="no input 'c'; it has 'a', 'b'"):
         compress(two, channels=("c", "y"))
-    with pytest.raises(HmpimError, match="lags = 0 is no window"):
+    with pytest.raises(HmpimError, match="lags = 0 is not a window"):
         compress(recorded(), lags=0)
     with pytest.raises(HmpimError, match="do not increase"):
         compress(recorded(), knots=(3.0, 1.0))

@@ -33,7 +33,7 @@ def test_bad_input_is_one_line(tmp_path):
     taken.write_text("")
     for words, message in (
         (("--figures", "24"), "figure 24 is not made here"),
-        (("--figures", "twelve"), "'twelve' is no figure's number"),
+        (("--figures", "twelve"), "'twelve' is not a figure's number"),
         (("12",), "write --figures 12"),
         (("--out", str(taken)), "is a file; name a folder"),
     ):

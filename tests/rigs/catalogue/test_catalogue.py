@@ -88,7 +88,7 @@ def test_limits_of_all_axes_or_of_each_in_their_units():
 
 def test_files_that_cannot_be_read(tmp_path):
     path = tmp_path / "rig.toml"
-    for data, words in ((b"rig = ", "is no TOML"), (b"\xff\xfe", "cannot be read")):
+    for data, words in ((b"rig = ", "is not valid TOML"), (b"\xff\xfe", "cannot be read")):
         path.write_bytes(data)
         with pytest.raises(FormatError, match=words):
             read_description(path)
@@ -101,7 +101,7 @@ def test_a_rig_file_and_a_name_may_not_contradict(tmp_path):
     described = describe({"rig": "sensor"})
     assert isinstance(find_rig("", description=described).rig, Rig)
     assert isinstance(find_rig("sensor", description=described).rig, Sensor)
-    with pytest.raises(FormatError, match="is about 'sensor', and 'table' is asked for"):
+    with pytest.raises(FormatError, match="describes 'sensor', but the command names 'table'"):
         find_rig("table", description=described)
     with pytest.raises(RigError, match="no rig is named; give --rig"):
         find_rig("", description=describe({}), start=tmp_path)
@@ -113,20 +113,24 @@ def test_a_rig_file_and_a_name_may_not_contradict(tmp_path):
         ("sensor", {"options": {"dealy": 0.1}}, "option 'dealy' is not known for a sensor"),
         ("sensor", {"options": {"delay": -1}}, "delay = -1 is out of range"),
         ("sensor", {"options": {"delay": "long"}}, "delay = 'long' is not a number"),
-        ("sensor:7", {}, "sensor:7 says more than there is; write sensor"),
+        ("sensor:7", {}, "sensor:7: a sensor takes no argument; write sensor"),
         ("table", {"load": "ton"}, "load 'ton' is not known"),
-        ("table", {"options": {"mode": "PV"}}, "stands outside the options, as 'mode'"),
+        ("table", {"options": {"mode": "PV"}}, "belongs outside the options, as 'mode'"),
         ("table", {"options": {"start": {"nod": 3}}}, "must be a table of angles"),
         ("table", {"options": {"start": {"yaw": "up"}}}, "holds no angles"),
         ("table", {"options": {"delay": "short"}}, "make no table"),
         ("table", {"axes": ["nod"]}, "axis 'nod' is none of the table's"),
         ("table", {"unlimited": True}, "the table has limits, those of Fig. 4"),
-        ("sensor", {"load": "bracket"}, "load = 'bracket' means nothing to a sensor; leave it out"),
-        ("tracker", {"mode": "PV"}, "mode = 'PV' means nothing to a tracker; leave it out"),
-        ("process:cat", {"load": "bracket"}, "load = 'bracket' means nothing to a program"),
-        ("udp://h:1", {"load": "bracket"}, "load = 'bracket' means nothing to a UDP rig"),
-        ("serial:x", {"mode": "PV"}, "mode = 'PV' means nothing to a serial rig; leave it out"),
-        ("can:x", {"load": "bracket"}, "load = 'bracket' means nothing to a CAN rig"),
+        (
+            "sensor",
+            {"load": "bracket"},
+            "load = 'bracket' does not apply to a sensor; leave it out",
+        ),
+        ("tracker", {"mode": "PV"}, "mode = 'PV' does not apply to a tracker; leave it out"),
+        ("process:cat", {"load": "bracket"}, "load = 'bracket' does not apply to a program"),
+        ("udp://h:1", {"load": "bracket"}, "load = 'bracket' does not apply to a UDP rig"),
+        ("serial:x", {"mode": "PV"}, "mode = 'PV' does not apply to a serial rig; leave it out"),
+        ("can:x", {"load": "bracket"}, "load = 'bracket' does not apply to a CAN rig"),
         ("process:cat", {"options": {"name": 3}}, "name = 3 is not a text"),
         ("seeker", {"load": "ton"}, "load 'ton' is not known"),
         ("python:f.py:smooth:smple", {}, "ends in 'smple', which is not known; after the function"),

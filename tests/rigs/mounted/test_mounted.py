@@ -208,9 +208,9 @@ def test_what_does_not_fit_is_refused_before_it_moves(carrier, unit, words):
 
 
 def test_what_cannot_be_mounted():
-    with pytest.raises(ArgumentError, match="is no rig, and carries nothing"):
+    with pytest.raises(ArgumentError, match="is not a rig, so it carries nothing"):
         Mounted(abs, SEEKER)
-    with pytest.raises(ArgumentError, match="is no unit to be carried"):
+    with pytest.raises(ArgumentError, match="is not a unit that can be carried"):
         Mounted(Axis(), Axis())
     with pytest.raises(ArgumentError, match=r"hold_period = 0\.1 .* are not simulated on a"):
         CarriedSensor(Sensor(hold_period=0.1))

@@ -85,7 +85,7 @@ def test_what_is_no_fmu_is_told(tmp_path):
     with pytest.raises(RigError, match=r"there is no FMU 'nowhere\.fmu'"):
         run(FmuRig(path="nowhere.fmu"), STIMULUS)
     (tmp_path / "x.fmu").write_bytes(b"PK no")
-    with pytest.raises(RigError, match="is no FMU that FMPy reads"):
+    with pytest.raises(RigError, match="is not an FMU that FMPy reads"):
         run(FmuRig(path=str(tmp_path / "x.fmu")), STIMULUS)
 
 

@@ -71,7 +71,7 @@ def test_whatever_comes_is_a_datagram_or_a_rig_error(data, keep):
     [
         (b"", "0 bytes that are no datagram of hmpim"),
         (b"HMPI\x02" + bytes(19), "speaks version 2 of the protocol, this one 1"),
-        (b"HMPI\x01\x63" + bytes(18), "a datagram of kind 99, which nobody knows"),
+        (b"HMPI\x01\x63" + bytes(18), "a datagram of kind 99, which is not known"),
         (b"HMPI\x01\x05\x00\x02" + bytes(16 + 24), "a command of 24 bytes for 2 axes; it must ha"),
         (b"HMPI\x01\x06\x00\x01" + bytes(16 + 28), "a response of 28 bytes for 1 axes"),
         (

@@ -240,7 +240,7 @@ class Unplugged(Network):
     def send(self, data):
         self.sent += 1
         if self.sent > 500:
-            raise RigError("serial:x is gone: device disconnected")
+            raise RigError("serial:x is disconnected: device disconnected")
         super().send(data)
 
     def close(self):
@@ -250,11 +250,11 @@ class Unplugged(Network):
 def test_a_port_that_is_gone_is_closed_and_the_cause_is_said():
     clock, log = ManualClock(), RunLog()
     line = Unplugged(clock)
-    said = "serial:x is gone: device disconnected; then it could not be told to stop$"
+    said = "serial:x is disconnected: device disconnected; then it could not be stopped$"
     with pytest.raises(RigError, match=said):
         run(WireRig(transport=line, clock=clock), SWEEP, log=log, options=RunOptions(clock=clock))
     assert line.closed == 1
-    assert "disconnecting failed: serial:x is gone" in log.text()
+    assert "disconnecting failed: serial:x is disconnected" in log.text()
 
 
 def test_nobody_answers():
@@ -279,7 +279,7 @@ def test_a_pulled_cable_is_noticed_and_the_far_end_comes_to_rest(way):
         network.delays = (cable, cable)
     words = {
         "there": "stopped by itself: no command came",
-        "back": "was told to stop and did not confirm within 2 s that it stands still; its",
+        "back": "was commanded to stop and did not confirm within 2 s that it stands still; its",
     }
     with pytest.raises(RigError, match=words[way]):
         run(

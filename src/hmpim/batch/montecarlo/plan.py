@@ -123,7 +123,7 @@ def read_plan(path: Path) -> Plan:
         told = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise FormatError(f"{str(path)!r} is no plan: {reason}") from None
+        raise FormatError(f"{str(path)!r} is not a plan: {reason}") from None
     for name in told:
         if name not in ("name", "seed", "draws", "regions", *KNOWN):
             raise ArgumentError(
@@ -177,7 +177,7 @@ def drawn(law: Any, rng: np.random.Generator) -> Value:
 
 def _checked(file: str, table: str, given: Any) -> dict[str, Any]:
     if not isinstance(given, dict):
-        raise ArgumentError(f"{file}: {table} is no table; write it as [{table}]")
+        raise ArgumentError(f"{file}: {table} is not a table; write it as [{table}]")
     for name, law in given.items():
         if name not in KNOWN[table]:
             known = ", ".join(KNOWN[table])
@@ -201,7 +201,7 @@ def _check_law(what: str, law: Any, *, words: bool) -> None:
             if kind == "normal" or (low < high and (kind == "uniform" or low > 0)):
                 return
     example = '"second_order"' if words else "{uniform = [0.1, 0.3]}"
-    raise ArgumentError(f"{what} = {bad!r} is no value and no law; write {example}")
+    raise ArgumentError(f"{what} = {bad!r} is neither a value nor a law; write {example}")
 
 
 def _is_value(value: object, *, words: bool) -> bool:
@@ -248,7 +248,7 @@ def _check_whole(file: str, plan: Plan) -> None:
         if name not in plan.varied:
             known = ", ".join(plan.varied) or "none"
             raise ArgumentError(
-                f"{file}: region {name!r} is no quantity that is drawn; those are {known}"
+                f"{file}: region {name!r} is not a quantity that is drawn; those are {known}"
             )
 
 

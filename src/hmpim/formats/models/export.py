@@ -135,12 +135,12 @@ def export(
     fmi: int | None = None,
     timestep: float | None = None,
 ) -> tuple[Path, ...]:
-    """Write what was identified as a model for another tool.
+    """Export an identified model to another tool.
 
-    Every export carries the error bars, the units, and where it comes from: the digest of the
-    record, the version of hmpim, the verdict and the warnings. Each file states what is exact in it
-    and what is not, and by how much. A nonlinear part is carried where the target has a form for
-    it; elsewhere the file says what it lacks.
+    Every export contains the error bars, the units and its origin: the digest of the record, the
+    version of hmpim, the verdict and the warnings. Each file states what is exact in it and what
+    is not, and by how much. A nonlinear part is included if the target has a form for it;
+    otherwise the file states what it lacks.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def export(
             )
     if not isinstance(result, Identification):
         raise ArgumentError(
-            f"{type(result).__name__} is no result; give what hmpim.identify returned, or what "
+            f"{type(result).__name__} is not a result; give what hmpim.identify returned or what "
             "was read back from its JSON"
         )
     place = Path(path)

@@ -47,7 +47,9 @@ def write_fmu(source: Source, path: Path, *, fmi: int = 2) -> tuple[Path, ...]:
         If there are no libraries in it.
     """
     if fmi not in (2, 3):
-        raise ArgumentError(f"fmi = {fmi!r} is no version of FMI that is written; give 2 or 3")
+        raise ArgumentError(
+            f"fmi = {fmi!r} is not a version of FMI that can be written; give 2 or 3"
+        )
     files = _texts(source, 2 if fmi == 2 else 3)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)

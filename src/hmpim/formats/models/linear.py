@@ -26,7 +26,7 @@ def write_control(source: Source, path: Path, *, pade: int | None = None) -> tup
         If the order is not from 1 to 20: beyond, its coefficients lose all digits.
     """
     if pade is not None and not 1 <= pade <= 20:
-        raise ArgumentError(f"pade = {pade!r} is no order from 1 to 20; give one of these")
+        raise ArgumentError(f"pade = {pade!r} is not an order from 1 to 20; give one of these")
     return _write(source, path, control=True, pade=pade)
 
 

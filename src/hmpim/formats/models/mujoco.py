@@ -99,7 +99,7 @@ def _stepped(source: Source, timestep: float | None) -> Stepped:
             "give timestep=0.001 or --timestep 0.001, as in its <option>"
         )
     if not (np.isfinite(timestep) and timestep > 0):
-        raise ArgumentError(f"timestep = {timestep!r} s is no step; give a positive number")
+        raise ArgumentError(f"timestep = {timestep!r} s is not a time step; give a positive number")
     model, h = source.causal(), float(timestep)
     if len(model.numerator) > 1 or len(model.denominator) > 4:
         raise ArgumentError(

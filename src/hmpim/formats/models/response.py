@@ -22,7 +22,7 @@ class Response:
     measured, model : complex ndarray, shape (m,)
         As measured, and of the model.
     measured_std, model_std : ndarray, shape (m,)
-        sqrt(E|error|²) of each; NaN where the record does not tell it.
+        sqrt(E|error|²) of each; NaN where the record does not determine it.
     """
 
     frequency: NDArray[np.float64]

@@ -61,7 +61,7 @@ class Source:
     note: str = ""
 
     def estimates(self) -> Iterator[tuple[str, Estimate]]:
-        """Yield every parameter that the record tells, with its name."""
+        """Yield every parameter that the record determines, with its name."""
         parameters = self.pair.parameters
         for field in fields(parameters):
             estimate = getattr(parameters, field.name)

@@ -135,8 +135,8 @@ class Contents:
 class Reader:
     """One format: how it is recognised, listed and read.
 
-    The functions must stand at the top level of a module, so that a worker process can be
-    told to run them.
+    The functions must be at the top level of a module, so that a worker process can run
+    them.
 
     Parameters
     ----------

@@ -172,7 +172,7 @@ def _sane(path: Path) -> Iterator[None]:
             yield
         except FormatError as error:
             raise FormatError(
-                f"{path.name!r} is no record file that can be read: {error}"
+                f"{path.name!r} is not a record file that can be read: {error}"
             ) from None
 
 

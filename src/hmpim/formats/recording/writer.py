@@ -181,7 +181,8 @@ class RecordWriter:
                     self._write(name, part.time, part.values)
         except OSError as error:
             raise RecordError(
-                f"{self._path.name!r} takes no more samples ({error.strerror or error}); what was "
+                f"{self._path.name!r} accepts no more samples "
+                f"({error.strerror or error}); what was "
                 "written before is kept"
             ) from error
 

@@ -251,7 +251,7 @@ def with_noise_doubted(
         more = tuple(
             replace(
                 finding,
-                message=f"Beside input {source!r}: {finding.message}",
+                message=f"As for input {source!r}: {finding.message}",
                 parameters=("noise_std",),
             )
             for code, (source, finding) in elsewhere.items()

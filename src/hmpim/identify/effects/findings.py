@@ -55,7 +55,7 @@ def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Itera
         yield Finding(
             code="saturation",
             message=f"{100 * clipping.share:.1f} % of the samples are clipped "
-            f"({', '.join(levels)}); the fit takes them to lie beyond the level. "
+            f"({', '.join(levels)}); the fit treats them as lying beyond the level. "
             + (
                 "These are too many to rely on: lower the amplitude, or look for a rectifier."
                 if much

@@ -55,7 +55,7 @@ def undetermined_between(
     yield Finding(
         code="intersample",
         message="This record does not determine what the input does between its samples. "
-        f"The input is taken as {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
+        f"The input is assumed to be {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
         "The intervals cover this. If you know it, state it with intersample=.",
         severity="info",
         parameters=_SHIFTED,

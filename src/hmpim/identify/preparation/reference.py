@@ -77,12 +77,13 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
     """
     if len(record.inputs) > 1:
         raise ArgumentError(
-            f"reference={reference!r} takes a record of one input; this one has "
+            f"reference={reference!r} requires a record of one input; this one has "
             f"{len(record.inputs)}: leave the others out"
         )
     if record.intersample == "sampled":
         raise ArgumentError(
-            f"reference={reference!r} takes a plant, not software (intersample='sampled'); leave "
+            f"reference={reference!r} is for a plant, not for software "
+            "(intersample='sampled'); leave "
             "one of the two out"
         )
     driver = next((c for c in record.channels if c.name == reference), None)

@@ -57,7 +57,7 @@ def check_statistics(intersample: Intersample | None, reference: str | None) -> 
         )
     if reference is not None:
         raise ArgumentError(
-            f"statistics keep no reference, and reference={reference!r} is asked for; identify "
+            f"statistics contain no reference, but reference={reference!r} is given; identify "
             "the record"
         )
 
@@ -69,7 +69,7 @@ def check_samples(record: Record) -> None:
         if channel.values.size < _FEWEST_SAMPLES:
             raise RecordError(
                 f"channel {channel.name!r} has {channel.values.size} samples; at least "
-                f"{_FEWEST_SAMPLES} are needed to tell dynamics from noise, so record longer"
+                f"{_FEWEST_SAMPLES} are needed to distinguish dynamics from noise, so record longer"
             )
     for channel in channels:
         largest, span = float(np.abs(channel.values).max()), float(np.ptp(channel.values / 2))

@@ -308,8 +308,7 @@ def _check_number(count: int, amplitudes: int, *, of: str) -> None:
     """Refuse numbers of results and amplitudes that do not go together, or a single level."""
     if count != amplitudes:
         raise ArgumentError(
-            f"{count} {of}s and {amplitudes} amplitudes do not go together; give one amplitude "
-            "for each"
+            f"{count} {of}s and {amplitudes} amplitudes do not match; give one amplitude for each"
         )
     if count < 2:
         raise ArgumentError(f"{count} {of} has nothing to be compared with; give two")

@@ -107,7 +107,7 @@ def _pair(found: tuple[PairIdentification, ...]) -> RepeatedPair:
             Finding(
                 code="unmodelled",
                 message=f"{unmodelled:.3g} (r.m.s.) of the residual recurs in "
-                "every repeat, so it is not noise. Look at the residual beside the stimulus.",
+                "every repeat, so it is not noise. Compare the residual with the stimulus.",
                 severity="doubt",
                 parameters=MODELLED,
             )

@@ -272,7 +272,7 @@ def _no_samples(statistics: Statistics) -> Finding:
         code="no_samples",
         message=f"This is identified from statistics of {statistics.samples} samples, which are "
         f"not kept: the frequency response is the model's own, and {left}. "
-        "Spikes and lost samples count as noise. Identify the record to see them.",
+        "Spikes and lost samples count as noise. To find them, identify the record itself.",
         severity="info",
         parameters=(),
     )

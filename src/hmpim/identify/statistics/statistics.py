@@ -189,12 +189,12 @@ class Statistics(ByValue):
                 are = "are" if isinstance(here, tuple) else "is"
                 raise ArgumentError(
                     f"{name} {are} {here!r} here and {there!r} there; only runs of one kind can be "
-                    "joined, so compress them alike"
+                    "joined, so compress both with the same settings"
                 )
         if self.reach.knots != other.reach.knots:
             raise ArgumentError(
                 f"the bias has {self.reach.rows} knots here and {other.reach.rows} there, or at "
-                "other times; compress both alike"
+                "other times; compress both with the same settings"
             )
 
 
@@ -269,7 +269,7 @@ def compress(
         lags = int(np.clip(aligned.samples // _SHARE, _SHORTEST, _LONGEST))
     elif not 1 <= lags <= _MOST:
         raise ArgumentError(
-            f"lags = {lags} is no window; give a number of samples from 1 to {_MOST}"
+            f"lags = {lags} is not a window; give a number of samples from 1 to {_MOST}"
         )
     if not all(abs(knot) * aligned.fs < _FARTHEST for knot in knots):
         raise ArgumentError(f"knots = {shown(knots)} are no times in s; give finite numbers")

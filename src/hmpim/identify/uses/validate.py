@@ -74,7 +74,7 @@ class Bounds:
                 f"noise_ratio = {self.noise_ratio!r} fails right models; give more than 1"
             )
         if self.chance is not None and not 0.0 < self.chance < 0.5:
-            raise ArgumentError(f"chance = {self.chance!r} is no p-value between 0 and 0.5")
+            raise ArgumentError(f"chance = {self.chance!r} is not a p-value between 0 and 0.5")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -70,7 +70,7 @@ def save(
     >>> from hmpim.plots.description import Axis
     >>> save(Figure(panels=(Panel(x=Axis(), y=Axis()),), alt=""), "a.docx")
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: 'a.docx' is no picture; name it .svg, .png or .pdf
+    hmpim.errors.ArgumentError: 'a.docx' is not a picture; name it .svg, .png or .pdf
     """
     import matplotlib as mpl
 
@@ -78,7 +78,7 @@ def save(
     kind = format or Path(name).suffix.lower().removeprefix(".") or "png"
     drawn = draw(figure)
     if kind not in drawn.canvas.get_supported_filetypes():
-        raise ArgumentError(f"{name!r} is no picture; name it .svg, .png or .pdf")
+        raise ArgumentError(f"{name!r} is not a picture; name it .svg, .png or .pdf")
     settings: dict[Any, Any] = {"svg.hashsalt": Path(name).name}
     stamp = {"svg": {"Date": None}, "png": {"Software": None}, "pdf": {"CreationDate": None}}
     with mpl.rc_context(settings), warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""The paper again: its figures and its printed numbers, beside what the method gives here."""
+"""The paper again: its figures and its printed numbers, next to the results of the method here."""
 
 from hmpim.report.paper.rows import Row, markdown_table, table_dict
 from hmpim.report.paper.study import FIGURES, Chapter, Study, make_study

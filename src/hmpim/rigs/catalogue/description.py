@@ -1,7 +1,7 @@
 """A rig described in a file: address, rate, axes, units, limits, watchdog, load.
 
-The same keys stand in a file of their own (``--rig-file``) or under ``[rigs.NAME]`` in
-``hmpim.toml``; one that is not known is refused by name.
+The same keys are used in a separate file (``--rig-file``) and under ``[rigs.NAME]`` in
+``hmpim.toml``; an unknown key is refused by name.
 """
 
 import math
@@ -194,4 +194,4 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         raise FormatError(f"{str(path)!r} cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
-        raise FormatError(f"{str(path)!r} is no TOML: {error}") from error
+        raise FormatError(f"{str(path)!r} is not valid TOML: {error}") from error

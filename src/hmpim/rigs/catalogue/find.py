@@ -1,4 +1,4 @@
-"""From what stands on the command line to a rig: a name, a kind, or an address."""
+"""Find the rig that the command line names: by name, kind or address."""
 
 import re
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ class FoundRig:
 
     @property
     def limits(self) -> LimitsOfAxes:
-        """Limits that the description states; to be kept beside the rig's own."""
+        """Limits that the description states, in addition to the rig's own."""
         return self.description.stated_limits()
 
 
@@ -80,7 +80,7 @@ def find_rig(
         described = description
         if text and described.rig and text != described.rig:
             raise FormatError(
-                f"the rig file is about {described.rig!r}, and {text!r} is asked for; "
+                f"the rig file describes {described.rig!r}, but the command names {text!r}; "
                 "leave one of them out"
             )
         text = text or described.rig

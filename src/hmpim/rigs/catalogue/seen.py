@@ -27,7 +27,7 @@ def build_tracker(argument: str, description: Description) -> TrackerRig:
     50.0
     """
     if argument:
-        raise FormatError(f"tracker:{argument} says more than there is; write tracker")
+        raise FormatError(f"tracker:{argument}: a tracker takes no argument; write tracker")
     known = {f.name for f in dataclasses.fields(TrackerRig) if f.init} - {"reset"}
     options = take_options(description, known, kind="tracker", instead={"limits": "limits"})
     return made_of(TrackerRig, with_camera(options), kind_name="tracker")
@@ -47,7 +47,7 @@ def build_seeker(argument: str, description: Description) -> SeekerRig:
     0.002
     """
     if argument:
-        raise FormatError(f"seeker:{argument} says more than there is; write seeker")
+        raise FormatError(f"seeker:{argument}: a seeker takes no argument; write seeker")
     known = {f.name for f in dataclasses.fields(SeekerRig) if f.init} - {"reset"}
     options = take_options(
         description, known, kind="seeker", instead={"limits": "limits"}, loaded=True

@@ -112,11 +112,11 @@ def take_options(
     """
     for name, value in (("load", description.load), ("mode", description.mode)):
         if value and not loaded:
-            raise FormatError(f"{name} = {value!r} means nothing to a {kind}; leave it out")
+            raise FormatError(f"{name} = {value!r} does not apply to a {kind}; leave it out")
     for name in description.options:
         if instead and name in instead:
             raise FormatError(
-                f"option {name!r} of a {kind} stands outside the options, as {instead[name]!r}"
+                f"option {name!r} of a {kind} belongs outside the options, as {instead[name]!r}"
             )
         if name not in known:
             raise FormatError(
@@ -143,4 +143,4 @@ def _start(given: Any) -> TablePosition:
 
 def _nothing_behind(kind: str, argument: str) -> None:
     if argument:
-        raise FormatError(f"{kind}:{argument} says more than there is; write {kind}")
+        raise FormatError(f"{kind}:{argument}: a {kind} takes no argument; write {kind}")

@@ -63,7 +63,7 @@ def build_can(argument: str, description: Description) -> WireRig:
 
 def _named(form: str, argument: str) -> None:
     if not argument:
-        raise FormatError(f"{form.partition(':')[0]} alone says not where; write {form}")
+        raise FormatError(f"{form.partition(':')[0]} alone gives no address; write {form}")
 
 
 def _some(options: dict[str, Any], names: set[str]) -> dict[str, Any]:

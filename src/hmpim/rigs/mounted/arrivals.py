@@ -1,12 +1,13 @@
-"""A clock that is heard and never asked: its stamps against when they arrived.
+"""Offset and drift of the clock of a unit that only sends: its stamps against arrival times.
 
-A unit that only sends says when, by its own clock, each sample was taken, and we note when it
-came. With unit = offset + (1 + drift) · run::
+Such a unit stamps each sample by its own clock, and we record when the sample arrived. With
+unit = offset + (1 + drift) · run::
 
-    arrived = (stamp - offset) / (1 + drift) + time on the way       (never less than the shortest)
+    arrived = (stamp - offset) / (1 + drift) + transit time          (never less than the shortest)
 
-The line under all arrivals gives drift and offset, up to the shortest time on the way: one
-direction alone cannot tell that from an offset. It has to be known, and is 0 where it is not.
+The line below all arrivals gives drift and offset, up to the shortest transit time, which cannot
+be distinguished from an offset with one direction alone. State it if you know it; otherwise it
+counts as 0.
 """
 
 import math

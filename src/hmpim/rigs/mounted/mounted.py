@@ -103,12 +103,15 @@ class Mounted:
 
     def __init__(self, carrier: Rig, unit: Unit | Sensor) -> None:
         if not isinstance(carrier, Rig):
-            raise ArgumentError(f"{carrier!r} is no rig, and carries nothing; see hmpim.rigs.Rig")
+            raise ArgumentError(
+                f"{carrier!r} is not a rig, so it carries nothing; see hmpim.rigs.Rig"
+            )
         if isinstance(unit, Sensor):
             unit = CarriedSensor(unit)
         if not isinstance(unit, Unit):
             raise ArgumentError(
-                f"{unit!r} is no unit to be carried; see hmpim.rigs.mounted.Unit, or give a Sensor"
+                f"{unit!r} is not a unit that can be carried; see "
+                "hmpim.rigs.mounted.Unit, or give a Sensor"
             )
         self._carrier, self._unit = carrier, unit
         self._stack = ExitStack()

@@ -1,4 +1,4 @@
-"""The platform of a seeker: a rate loop with a lag, told a new rate now and then."""
+"""The platform of a seeker: a rate loop with a lag, commanded to a new rate now and then."""
 
 import math
 from collections import deque

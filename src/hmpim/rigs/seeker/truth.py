@@ -1,4 +1,4 @@
-"""Closed form of a seeker's response, frames and all: what a record is held against."""
+"""Closed form of a seeker's response, frames and all, with which a record is compared."""
 
 from typing import Literal
 

@@ -79,7 +79,7 @@ def load_code(file: str, name: str) -> Callable[[Any], Any]:
         raise RigError(f"there is no file {file!r} to take {name!r} from")
     spec = importlib.util.spec_from_file_location(f"hmpim_under_test_{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise RigError(f"{file!r} is no Python file; its name must end in .py")
+        raise RigError(f"{file!r} is not a Python file; its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     beside = str(path.resolve().parent)
     sys.path.insert(0, beside)

@@ -317,7 +317,7 @@ def read_described(path: str) -> Any:
     try:
         described = fmpy.read_model_description(path)
     except Exception as error:  # FMPy raises bare Exception
-        raise RigError(f"{path!r} is no FMU that FMPy reads: {_words(error, [])}") from error
+        raise RigError(f"{path!r} is not an FMU that FMPy reads: {_words(error, [])}") from error
     if described.fmiVersion not in ("2.0", "3.0"):
         raise RigError(f"{path!r} is of FMI {described.fmiVersion}; 2.0 and 3.0 can be run")
     return described

@@ -105,7 +105,7 @@ class TablePosition:
     def __post_init__(self) -> None:
         for axis in AXES:
             if not math.isfinite(getattr(self, axis)):
-                raise ArgumentError(f"{axis} = {getattr(self, axis)!r} deg is no position")
+                raise ArgumentError(f"{axis} = {getattr(self, axis)!r} deg is not a position")
 
 
 # Limits and bandwidths: Fig. 4. Torque: what the acceleration limit takes with the acceptance

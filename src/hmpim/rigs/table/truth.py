@@ -1,4 +1,4 @@
-"""What an identification of the table is held against: its exact linear responses."""
+"""Exact linear responses of the table, with which an identification is compared."""
 
 from dataclasses import replace
 from typing import Literal

@@ -1,4 +1,4 @@
-"""A tracker under test: the line of sight is moved, and what the tracker says is recorded."""
+"""A tracker under test: the stimulus moves the line of sight, the tracker's output is recorded."""
 
 import math
 from collections.abc import Callable
@@ -146,7 +146,7 @@ class TrackerRig(Simulated):
         if np.abs(angles).max() > self.scene.reach:
             raise LimitsError(
                 f"the target would leave the frame: {np.abs(angles).max():.4g} deg from the axis, "
-                f"where {self.scene.reach:.4g} deg is seen; scale the stimulus down"
+                f"where only {self.scene.reach:.4g} deg is visible; scale the stimulus down"
             )
         watching = Watching(
             self.camera, self.scene.backdrop(rng), self._tracker(float(angles[0])), rng

@@ -98,7 +98,7 @@ def fit_clocks(
         )
     if t1.size < 2 or t3.size < 2:
         raise ArgumentError(
-            f"{t1.size} datagrams there and {t3.size} back tell nothing of the clocks; at least "
+            f"{t1.size} datagrams there and {t3.size} back do not determine the clocks; at least "
             "two of each are needed"
         )
     origin = 0.5 * (float(min(t1.min(), t4.min())) + float(max(t1.max(), t4.max())))

@@ -8,7 +8,7 @@ All numbers are in network byte order. Every datagram begins with the same 24 by
     5       1     kind, see `Kind`
     6       2     number n of axes in the payload; 0 where there are none
     8       4     session, drawn by the near end for each run; 0 before there is one
-    12      4     number of this datagram, from 0 on, one more each time
+    12      4     number of this datagram, counted from 0
     16      8     time stamp: nanoseconds of the sender's own clock when it was sent
 
 The rest depends on the kind::
@@ -19,7 +19,7 @@ The rest depends on the kind::
                0   4  number of the command in force at this tick; 2³² - 1 for none
                4   4  number of the newest command that has arrived; 2³² - 1 for none
                8   1  state, see `State`
-               9   1  1 if the command in force was reckoned, because none had come; else 0
+               9   1  1 if the command in force was extrapolated, because none had arrived; else 0
                10  2  reserved, 0
                12  8  when the sample was taken, ns of the far end's clock
                20  8  when the newest command arrived, ns of the far end's clock
@@ -210,7 +210,7 @@ def unpack(data: bytes) -> Datagram:
     try:
         kind = Kind(number_of_kind)
     except ValueError:
-        raise RigError(f"a datagram of kind {number_of_kind}, which nobody knows") from None
+        raise RigError(f"a datagram of kind {number_of_kind}, which is not known") from None
     body = data[_HEAD.size :]
     command = response = None
     text = ""
@@ -246,7 +246,7 @@ def _response(body: bytes, axes: int) -> Response:
     try:
         known = State(state)
     except ValueError:
-        raise RigError(f"a response with state {state}, which nobody knows") from None
+        raise RigError(f"a response with state {state}, which is not known") from None
     position, measured = _columns(body, 2, offset=_RESPONSE.size)
     return Response(
         in_force=in_force,

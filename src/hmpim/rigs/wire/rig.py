@@ -217,7 +217,8 @@ class WireRig:
             else "it has no watchdog, so stop it by hand"
         )
         raise RigError(
-            f"{self.name!r} at {self._transport.name} was told to stop and did not confirm within "
+            f"{self.name!r} at {self._transport.name} was commanded to stop and did not "
+            "confirm within "
             f"{deadline - begun:.3g} s that it stands still; {braking}"
         )
 

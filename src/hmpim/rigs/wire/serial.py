@@ -97,7 +97,7 @@ class SerialClient:
         except serial.SerialTimeoutException:
             return  # the line is full: as good as lost
         except OSError as error:
-            raise RigError(f"{self.name} is gone: {error}") from error
+            raise RigError(f"{self.name} is disconnected: {error}") from error
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the next datagram, None if none comes within `timeout` (s).
@@ -115,7 +115,7 @@ class SerialClient:
                 self._line.timeout = max(left, 0.0)
                 data = self._line.read(max(1, self._line.in_waiting))
             except OSError as error:
-                raise RigError(f"{self.name} is gone: {error}") from error
+                raise RigError(f"{self.name} is disconnected: {error}") from error
             self._came += len(data)
             self._found.extend(self._deframer.take(data))
             if not self._found and left <= 0.0:

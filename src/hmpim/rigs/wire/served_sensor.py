@@ -119,7 +119,8 @@ def sensor_hello(sensor: Sensor, *, rate: float, watchdog: float, limits: Limits
         if math.isinf(getattr(limits, name)):
             raise ArgumentError(
                 f"no {name} limit is stated for {sensor.name!r}; its axis cannot be stopped inside "
-                "limits that it has not: state position, velocity and acceleration under [limits]"
+                "limits that are not stated: state position, velocity and acceleration "
+                "under [limits]"
             )
     return Hello(
         name=sensor.name,

@@ -92,11 +92,11 @@ def parse_address(text: str) -> tuple[str, int]:
     (('127.0.0.1', 5005), ('::1', 5005))
     >>> parse_address("somewhere")
     Traceback (most recent call last):
-    hmpim.errors.RigError: 'somewhere' is no address; write HOST:PORT, such as 127.0.0.1:5005
+    hmpim.errors.RigError: 'somewhere' is not an address; write HOST:PORT, such as 127.0.0.1:5005
     """
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdecimal() or not 0 <= int(port) <= 65_535:
-        raise RigError(f"{text!r} is no address; write HOST:PORT, such as 127.0.0.1:5005")
+        raise RigError(f"{text!r} is not an address; write HOST:PORT, such as 127.0.0.1:5005")
     return host.removeprefix("[").removesuffix("]"), int(port)
 
 

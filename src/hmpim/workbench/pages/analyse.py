@@ -64,7 +64,7 @@ class AnalysePage:
             self.shown = ui.element("div").classes("hm-body").props('aria-live="polite"')
         if not self.wish.file:
             with self.shown, card("Begin"):
-                ui.label("Drop a record, or choose one of the folder, to identify it.")
+                ui.label("Drop a record, or choose one from the folder, to identify it.")
                 ui.link("To make one, design a test first.", f"/design?desk={window.name}")
         self.command = Command()
 

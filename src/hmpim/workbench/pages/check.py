@@ -16,7 +16,7 @@ __all__ = ["check"]
 
 _WORDS = {
     "limits": "Limits: every axis stays inside, and can be stopped smoothly",
-    "error bars": "Error bars: the run will reach the accuracy asked for",
+    "error bars": "Error bars: the run will reach the wanted accuracy",
     "independence": "Independence: the axes can be distinguished",
     "answer": "Answer: the rig follows at 5 % of the amplitude",
 }
@@ -116,7 +116,7 @@ class CheckPage:
             colour = "hm-ok" if green else "hm-bad" if known else "hm-soft"
             icon.set_name(mark)
             icon.classes(replace=colour)
-            icon.props(f'aria-label="{"green" if green else "red" if known else "not asked"}"')
+            icon.props(f'aria-label="{"green" if green else "red" if known else "not checked"}"')
             words.set_text(light.words if light is not None else "")
         green = fresh and set(LIGHTS) <= set(desk.checked.green)
         if running:

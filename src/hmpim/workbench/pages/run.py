@@ -189,7 +189,7 @@ class RunPage:
             elif ended.reason:
                 ui.label(f"Ended early: {ended.reason}.").classes("hm-doubt hm-verdict")
             else:
-                ui.label("Played to its end.").classes("hm-ok hm-verdict")
+                ui.label("Played to the end.").classes("hm-ok hm-verdict")
             if ended.kept:
                 name = str((folder / "run.h5").relative_to(self.window.workbench.settings.runs))
                 ui.label(f"Record: {name}")

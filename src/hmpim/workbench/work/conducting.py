@@ -49,7 +49,7 @@ def checked_plan(text: str) -> Plan:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise FormatError(f"the plan is no TOML: {error}") from error
+        raise FormatError(f"the plan is not valid TOML: {error}") from error
     plan = parse_plan(data)
     if plan.rig.kind == "python":
         raise ArgumentError(

@@ -80,7 +80,7 @@ def stimuli_of(wish: Wish) -> tuple[Stimulus, ...]:
     Raises
     ------
     HmpimError
-        If it cannot be met; the message says what would do.
+        If it cannot be met; the message says what is enough.
     """
     samples = len(wish.rows) * wish.duration * wish.fs
     if samples > MOST_SAMPLES:

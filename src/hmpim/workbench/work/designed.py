@@ -49,7 +49,7 @@ def designed(wish: Wish, axis: int = 0) -> Designed:
     Raises
     ------
     HmpimError
-        If it cannot be met; the message says what would do.
+        If it cannot be met; the message says what is enough.
     """
     stimuli = stimuli_of(wish)
     peaks = peak_rows(wish, stimuli)

@@ -182,7 +182,7 @@ def _lights(
             light = Light(name="answer", green=False, words=f"stopped: {wish.reason}")
         yield light
     else:
-        yield Light(name="answer", green=False, words="not asked: the rig is not moved yet")
+        yield Light(name="answer", green=False, words="not checked: the rig has not been moved yet")
 
 
 def _stated(found: FoundRig) -> Any:

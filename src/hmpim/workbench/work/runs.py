@@ -118,7 +118,7 @@ def compared(
     known = {run.name: run for run in find_runs(folder).runs}
     missing = [name for name in names if name not in known]
     if missing:
-        raise ArgumentError(f"run {missing[0]!r} is not there any more")
+        raise ArgumentError(f"run {missing[0]!r} no longer exists")
     results = [
         (name, _result(known[name])) for name in sorted(names, key=lambda n: known[n].created)
     ]

@@ -85,7 +85,7 @@ def read_notes(comments: Sequence[str], headings: Sequence[Heading], *, file: st
                 return _checked(noted, headings)
             except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
                 raise FormatError(
-                    f"{file!r} starts with a spoilt comment {comment[:40]!r} ({error}); "
+                    f"{file!r} starts with a damaged comment {comment[:40]!r} ({error}); "
                     "delete that line"
                 ) from None
     return None

@@ -268,7 +268,9 @@ def stamp_column(
         kind: Kind = "clock" if _CLOCK_ALONE.match(first) else "date"
         ticks = _nanoseconds(first, kind)
         if ticks is None:
-            raise FormatError(f"column {heading!r} holds {first!r}, which is no date; correct it")
+            raise FormatError(
+                f"column {heading!r} holds {first!r}, which is not a date; correct it"
+            )
         base = 0 if kind == "clock" else ticks // _NANO * _NANO
         return StampColumn(kind=kind, base=base)
     told, largest = False, _largest(there, decimal)
@@ -282,7 +284,7 @@ def stamp_column(
         conversion_factor(unit, to="s")
     except UnitError:
         raise UnitError(
-            f"column {heading!r}: {unit!r} is no unit of time; use s, ms or us"
+            f"column {heading!r}: {unit!r} is not a unit of time; use s, ms or us"
         ) from None
     since_1970 = told or (unit == "s" and 1e8 <= largest < 1e11)
     if not exact and since_1970 and all(re.fullmatch(r"\d+([.,]\d+)?", c) for c in there):

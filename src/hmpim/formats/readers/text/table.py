@@ -325,7 +325,7 @@ def _said_width(table: Table, row: str, line: int) -> str:
     count, width = len(split_row(row, table.dialect.delimiter)), table.dialect.width
     message = f"{table.lines.name!r}, line {line} has {count} cells where {width} are needed"
     if table.dialect.delimiter == "," and count in (2 * width - 1, 2 * width):
-        return f"{message}: a decimal comma is no delimiter; export it with decimal points"
+        return f"{message}: a decimal comma is not a delimiter; export it with decimal points"
     return f"{message}; correct that line, or cut it out"
 
 

@@ -270,7 +270,7 @@ def _started(limits: tuple[int, float | None]) -> _Worker:
         )
     except OSError as error:
         raise FormatError(
-            f"the process that reads formats of others cannot be started: {error}"
+            f"the process that reads third-party formats cannot be started: {error}"
         ) from None
     return _Worker(process=process, scratch=scratch, owner=os.getpid(), limits=limits)
 
@@ -309,7 +309,7 @@ def _number(variable: str) -> float | None:
     except ValueError:
         value = 0.0
     if not 0 < value < 1e6:
-        raise ArgumentError(f"{variable}={text!r} is no positive number; write it as 8")
+        raise ArgumentError(f"{variable}={text!r} is not a positive number; write it as 8")
     return value
 
 
