@@ -13,16 +13,15 @@ from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, ljung_box
-from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.uses.gains import gain_unit
 from hmpim.identify.uses.nonlinear import all_applied
 from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
-from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Aligned, Finding, Record, uniform
 
 __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
@@ -271,12 +270,8 @@ def _check_units(pair: PairIdentification, aligned: Aligned) -> None:
         return
     if not (known.bias.unit and u.unit and y.unit):
         return
-    named = (known for known in STRUCTURES.values() if known.name == pair.structure)
-    structure = next(named, FILTERS["static"])  # a filter's gain is output over input as well
-    scales = {
-        units_of(structure, (unit, y.unit))["scale_factor"]
-        for unit in (u.unit, "")  # the result may not have the unit of its input
-    }
+    # The result may not have the unit of its input.
+    scales = {gain_unit(pair, (unit, y.unit)) for unit in (u.unit, "")}
     if known.bias.unit != y.unit or known.scale_factor.unit not in scales:
         raise RecordError(
             f"{pair.output!r} from {pair.input!r} was identified with an output in "
