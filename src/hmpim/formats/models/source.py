@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 
+from hmpim.arguments import check_size
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import (
     Estimate,
@@ -195,6 +196,7 @@ def source_of(
     rate = result.record.fs if fs is None else fs
     if not rate > 0:
         raise ArgumentError(f"fs = {rate!r} Hz is not a rate; give a positive number")
+    check_size("fs", rate, "Hz")
     model = to_model(chosen, fs=result.record.fs)
     return Source(
         name=identifier(name),

@@ -1,13 +1,15 @@
 """What a reader is: three functions and the facts that a person needs about its format."""
 
 import importlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
-from hmpim.errors import MissingExtraError
+from hmpim.arguments import check_size
+from hmpim.errors import ArgumentError, MissingExtraError
 from hmpim.record import Finding, Intersample, Series, Stopping
 
 __all__ = [
@@ -48,6 +50,11 @@ class Layout:
     sheet : str or None
         Sheet of a workbook, or table of a file with several; the first if None.
 
+    Raises
+    ------
+    ArgumentError
+        If the rate is none.
+
     Examples
     --------
     >>> Layout(time="stamp").stamps
@@ -58,6 +65,15 @@ class Layout:
     fs: float | None = None
     stamps: Stamps = "auto"
     sheet: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.fs is None:
+            return
+        if not 0.0 < self.fs < math.inf:
+            raise ArgumentError(
+                f"fs = {self.fs} Hz is not a sampling rate; it must be positive and finite"
+            )
+        check_size("fs", self.fs, "Hz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,6 @@
 """Validation of a result on another record: fit, residual, and the band of the prediction."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -66,6 +67,9 @@ class Bounds:
     chance: float | None = FALSE_ALARM
 
     def __post_init__(self) -> None:
+        for name, value in (("fit_percent", self.fit_percent), ("noise_ratio", self.noise_ratio)):
+            if value is not None and math.isinf(value):
+                raise ArgumentError(f"{name} = {value!r} is no bound; give a finite number")
         if self.fit_percent is not None and not self.fit_percent < 100:
             raise ArgumentError(f"fit_percent = {self.fit_percent!r} cannot be met; stay below 100")
         if self.noise_ratio is not None and not self.noise_ratio > 1.0:
