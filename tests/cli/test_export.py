@@ -96,7 +96,7 @@ def test_a_nonlinearity_that_a_target_lacks_is_said(tmp_path, capsys):
     assert run("export", tmp_path / "r.json", "--to", "csv", "-o", tmp_path / "m.csv") == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert (
-        "m.csv: The file holds the linear part alone: it omits backlash (half the gap is" in shown
+        "m.csv: The file holds the linear part alone: it omits backlash (half its gap is" in shown
     )
     assert run("export", tmp_path / "r.json", "--to", "python", "-o", tmp_path / "m.py") == 0
     assert "omits" not in capsys.readouterr().out

@@ -7,7 +7,7 @@ import numpy as np
 from hmpim.formats.models.refined import REFINE
 from hmpim.formats.models.source import LINEAR_PART, Source
 from hmpim.identify import left_out
-from hmpim.identify.result.digits import plus_minus
+from hmpim.identify.result.sizes import size_in_words
 from hmpim.model import Model, simulate
 from hmpim.model.nonlinear import NonlinearPart, excursion
 
@@ -42,7 +42,7 @@ def with_nonlinear_part(source: Source, to: str) -> tuple[Source, str | None]:
     part = source.model.nonlinear
     if part is None:
         return source, None
-    size = _size(part, source.model.output_unit)
+    size = size_in_words(part, (source.model.input_unit, source.model.output_unit))
     if not _carries(to, part, source.model):
         said = f"{LINEAR_PART}it omits {part.words} ({size})."
         linear = replace(source.model, nonlinear=None)
@@ -50,22 +50,6 @@ def with_nonlinear_part(source: Source, to: str) -> tuple[Source, str | None]:
     return replace(
         source, note=f"The file includes {part.words} ({size}){_how(source, part, to)}"
     ), None
-
-
-def _size(part: NonlinearPart, unit: str) -> str:
-    """The size in words."""
-    words = {
-        "backlash": "half the gap is",
-        "dead_zone": "half the width is",
-        "friction": "equal to the restoring force at a deflection of",
-        "rate_limit": "at most",
-    }
-    if part.kind not in words:
-        share = plus_minus(100.0 * abs(part.size), 100.0 * part.std)
-        return f"{share} % of the linear part at a deflection of {part.reach:.4g} {unit}".rstrip()
-    units = {"rate_limit": "per s", "dead_zone": ""}
-    size = f"{words[part.kind]} {plus_minus(part.size, part.std)} {units.get(part.kind, unit)}"
-    return size.rstrip()
 
 
 def _carries(to: str, part: NonlinearPart, model: Model) -> bool:
