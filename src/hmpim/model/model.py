@@ -7,7 +7,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.arguments import checked, generator, numbers_of
+from hmpim.arguments import check_size, checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.driven import driven
@@ -104,6 +104,7 @@ class Model:
             object.__setattr__(self, name, coefficients)
         for name in ("delay", "scale_factor", "bias", "noise_std", "hold_phase"):
             numbers_of(name, getattr(self, name))
+        check_size("delay", float(self.delay), "s", added=True)
         _check_readout(self)
         if self.intersample == "sampled":
             _check_filter(self)

@@ -234,8 +234,9 @@ def excursion(
 
 def farthest(part: NonlinearPart, linear: _Real, effect: _Real | None) -> float:
     """Largest deflection by a part that is not in front of the dynamics, from what it adds."""
-    moves = part.at == "force" and part.kind != "friction" and effect is not None
-    return float(np.max(np.abs(linear + effect if moves else linear)))
+    if effect is None or part.at != "force" or part.kind == "friction":
+        return float(np.max(np.abs(linear)))
+    return float(np.max(np.abs(linear + effect)))
 
 
 def friction(part: NonlinearPart, system: RationalDelay, fine: _Real, fs: float) -> _Real:

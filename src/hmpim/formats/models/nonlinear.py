@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hmpim.errors import ArgumentError
 from hmpim.formats.models.refined import REFINE
 from hmpim.formats.models.source import LINEAR_PART, Source
 from hmpim.identify import left_out
@@ -26,7 +27,13 @@ _MOST_POLES = 6
 """Poles up to which a script steps a force: beyond, the coefficients lose their digits."""
 
 _SAMPLES = 2000
-"""Samples of the sweep on which a program is compared with the model."""
+"""Samples of the sweep on which a program is compared with the model, at least."""
+
+_MOST_SAMPLES = 100_000
+"""And at most: a second or two of stepping."""
+
+_CYCLES = 20.0
+"""Periods of its highest frequency that it lasts, after twice the delay, at any rate."""
 
 
 class LinearPartOnly(UserWarning):
@@ -99,7 +106,13 @@ def _stepped_error(source: Source) -> float:
         hold_period=None,
     )
     highest = min(model.band or 0.2 * fs, 0.45 * fs)
-    t = np.arange(_SAMPLES) / fs
+    wanted = fs * (2.0 * max(model.delay, 0.0) + _CYCLES / highest)
+    t = np.arange(int(min(max(wanted, _SAMPLES), _MOST_SAMPLES))) / fs
+    if t[-1] <= 1.1 * model.delay:
+        raise ArgumentError(
+            f"fs = {fs:g} Hz is too fast for a program with a delay of {model.delay:.4g} s, which "
+            f"is {model.delay * fs:.3g} samples; give a lower rate with fs=... or --fs"
+        )
     u = np.sin(np.pi * highest * t**2 / t[-1])
     # The reach of a force is that of the whole output, which may resonate where x does not.
     share, seen = 1.0, part

@@ -46,14 +46,14 @@ def applied(
     found: tuple[Finding, ...] = ()
     if lacking is not None:
         found = (_linear_only(pair, f"{lacking} was found, but is not part of the model"),)
-    elif model.nonlinear is not None:
+    elif (part := model.nonlinear) is not None:
         try:
             moved, reach = simulate_with_reach(model, u, fs=fs)
         except ArgumentError as reason:
             model = replace(model, nonlinear=None)
             found = (_linear_only(pair, str(reason)),)
         else:
-            return model, moved, _beyond(pair, model, model.nonlinear, reach)
+            return model, moved, _beyond(pair, model, part, reach)
     return model, simulate(model, u, fs=fs, intersample=model.intersample), found
 
 
