@@ -87,6 +87,9 @@ def test_both_at_once(folder):
     [
         (["old.json"], "nothing to hold the result against"),
         (["old.json", "nowhere.csv"], "nowhere.csv"),
+        (["old.json", "--against", "new.json", "--fit", "90"], "--fit is about a record"),
+        (["old.json", "--against", "new.json", "--stamps", "log"], "--stamps is about a record"),
+        (["old.json", "right.csv", "--sweep", "0"], "greater than or equal to 1"),
         (["right.csv", "right.csv"], "not a result"),
         (["old.json", "right.csv", "--noise-ratio", "0.5"], "noise_ratio = 0.5"),
         (["old.json", "right.csv", "--json", "old.json"], "old.json"),
