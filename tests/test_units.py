@@ -44,6 +44,12 @@ def test_known_factors(unit, to, factor):
     assert conversion_factor(unit, to=to) == pytest.approx(factor, rel=1e-12)
 
 
+def test_units_of_different_zeros_have_no_factor():
+    with pytest.raises(UnitError, match="'degC' cannot be turned into 'K' by a factor"):
+        conversion_factor("degC", to="K")
+    assert conversion_factor("delta_degC", to="K") == 1.0
+
+
 @given(
     units=st.sampled_from(
         [["deg", "rad", "mrad", "arcsec"], ["m", "mm", "inch"], ["m/s", "km/hour", "knot"]]

@@ -5,6 +5,7 @@ checker, in one sentence. Arrays are left to the function itself, which knows th
 """
 
 import inspect
+import math
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass
@@ -20,6 +21,7 @@ from hmpim.errors import ArgumentError
 __all__ = [
     "MOST_SAMPLES",
     "check_argument",
+    "check_size",
     "checked",
     "fits",
     "generator",
@@ -38,6 +40,10 @@ A stimulus keeps time, position, velocity and acceleration, and its formulas tak
 """
 
 _BYTES = 64
+
+_LARGEST = 1e30
+"""Largest size that is computed with, and its reciprocal the smallest: the eighth power of either
+is still a number, and no unit makes what can be measured so large or so small."""
 
 _SOURCES = {
     "Record": "read a file with hmpim.read(path), or take hmpim.Record.from_arrays(...)",
@@ -249,6 +255,42 @@ def shown(value: object) -> str:
 
 
 _LONGEST = 41
+
+
+def check_size(name: str, value: float, unit: str = "", *, added: bool = False) -> None:
+    """Refuse a size so large or so small that numbers computed from it overflow.
+
+    Zero, infinity and NaN are left to the caller.
+
+    Parameters
+    ----------
+    name, value, unit : str, float, str
+        The size, and what it is called.
+    added : bool
+        True for a size that is only added to others, so that it may be as small as it likes.
+
+    Raises
+    ------
+    ArgumentError
+        If it is beyond 1e30, or below 1e-30.
+
+    Examples
+    --------
+    >>> check_size("fs", 200.0, "Hz")
+    >>> check_size("fs", 1e308, "Hz")
+    Traceback (most recent call last):
+    hmpim.errors.ArgumentError: fs = 1e+308 Hz is too large to compute with; sizes ... 1e+30
+    """
+    size = abs(value)
+    small = size < 1.0 / _LARGEST and size != 0 and not added
+    if not math.isfinite(size) or not (small or size > _LARGEST):
+        return
+    much = "small" if small else "large"
+    shown = f"{value:g} {unit}".rstrip()
+    raise ArgumentError(
+        f"{name} = {shown} is too {much} to compute with; "
+        f"sizes may be from {1.0 / _LARGEST:g} to {_LARGEST:g}"
+    )
 
 
 def generator(rng: np.random.Generator | int | None) -> np.random.Generator:

@@ -118,7 +118,7 @@ def conversion_factor(unit: str, *, to: str) -> float:
     Raises
     ------
     UnitError
-        If either is unknown, or the dimensions differ.
+        If either is unknown, the dimensions differ, or their zeros do, as of 'degC' and 'K'.
 
     Examples
     --------
@@ -136,9 +136,15 @@ def _factor(unit: str, to: str) -> float:
     if (unit, to) in _ANGLES:  # asked for by every table; the registry takes half a second
         return _ANGLES[unit, to]
     try:
-        return float(_registry().Quantity(1.0, _parsed(unit)).to(_parsed(to)).magnitude)
+        zero, size = (
+            float(_registry().Quantity(value, _parsed(unit)).to(_parsed(to)).magnitude)
+            for value in (0.0, 1.0)
+        )
     except _mismatch() as error:
         raise UnitError(f"unit {unit!r} cannot be turned into {to!r}: {error}") from error
+    if zero:
+        raise UnitError(f"unit {unit!r} cannot be turned into {to!r} by a factor: its zero differs")
+    return size
 
 
 # By how they are written: what pint takes for something else, or for nothing.

@@ -101,8 +101,8 @@ def test_records_are_fitted_together_without_a_file_between(folder, tmp_path):
     [
         (["a.h5"], "--together fits several records as one, but only one is given"),
         (["a.h5", "b.h5", "--holdout", "0.3"], "--holdout applies to one record, but 2 are given"),
-        (["a.h5", "a.h5"], "runs 1 and 2 hold the same samples"),
-        (["a.h5", "two.h5"], "the record has 2 channels for --output (y, z)"),
+        (["a.h5", "a.h5"], "a.h5' hold the same samples"),
+        (["a.h5", "two.h5"], "two.h5': the record has 2 channels for --output (y, z)"),
         (["a.h5", "b.h5", "--output", "y", "--output", "z"], "and --output is given 2 times"),
     ],
 )
@@ -170,9 +170,9 @@ def test_a_record_that_would_count_twice_is_refused(folder, tmp_path, second):
     """Two of one run would make each standard deviation too small by the root of two."""
     done = run("compress", folder / "a.h5", folder / second, "-o", tmp_path / "twice.h5")
     assert done.exit_code == 2
-    assert "runs 1 and 2 hold the same samples" in done.stderr
+    assert "run 1 and run 2 hold the same samples" in done.stderr
     done = run("identify", folder / "small.h5", folder / "small.h5")
     assert done.exit_code == 2
-    assert "runs 1 and 2 hold the same samples" in done.stderr
+    assert "run 1 and run 2 hold the same samples" in done.stderr
     both = run("compress", folder / "a.h5", folder / "b.h5", "-o", tmp_path / "both.h5")
     assert both.exit_code == 0, both.stderr

@@ -96,7 +96,7 @@ def test_a_nonlinearity_that_a_target_lacks_is_said(tmp_path, capsys):
     assert run("export", tmp_path / "r.json", "--to", "csv", "-o", tmp_path / "m.csv") == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert (
-        "m.csv: The file holds the linear part alone: it omits backlash (half the gap is" in shown
+        "m.csv: The file holds the linear part alone: it omits backlash (half its gap is" in shown
     )
     assert run("export", tmp_path / "r.json", "--to", "python", "-o", tmp_path / "m.py") == 0
     assert "omits" not in capsys.readouterr().out
@@ -105,3 +105,21 @@ def test_a_nonlinearity_that_a_target_lacks_is_said(tmp_path, capsys):
     stepped = runpy.run_path(str(tmp_path / "m.py"))["simulate"](drive.sampled())
     assert stepped == pytest.approx(truth, abs=1e-9)
     assert np.std(stepped - moved("backlash", drive)) < 0.005
+
+
+def test_a_rate_at_which_a_program_would_keep_too_much_is_refused(result, tmp_path, capsys):
+    bent = tmp_path / "bent.json"
+    hmpim.save(hmpim.identify(recorded(chirp(), moved("backlash", chirp()), 1)), bent)
+    for found in (result, bent):
+        words = ("export", found, "--to", "python", "-o", tmp_path / "m.py")
+        assert run(*words, "--fs", "1e5") == 0
+        capsys.readouterr()
+        assert run(*words, "--fs", "1e9") == 2
+        error = capsys.readouterr().err
+        assert "fs = 1e+09 Hz is too fast" in error
+        assert len(error.splitlines()) == 1
+
+
+def test_a_choice_that_fits_no_pair_says_how_to_choose(result, tmp_path, capsys):
+    assert run("export", result, "--to", "json", "-o", tmp_path / "m.json", "--input", "v") == 2
+    assert "give --output and --input of one of them" in capsys.readouterr().err

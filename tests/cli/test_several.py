@@ -3,6 +3,7 @@
 import html
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -238,3 +239,40 @@ def test_what_is_refused_names_the_files(tmp_path):
         done = run(first, write(tmp_path / name, columns))
         assert done.exit_code == 2
         assert re.search(words, done.stderr), done.stderr
+
+
+def test_a_record_that_cannot_be_used_is_named(tmp_path):
+    good = [
+        write(tmp_path / f"{k}.csv", {"u": U, "y": output(U, natural=8.0, seed=k)})
+        for k in range(2)
+    ]
+    still = write(tmp_path / "still.csv", {"u": 0.0 * U, "y": output(U, natural=8.0, seed=3)})
+    short = tmp_path / "short.csv"
+    lines = (tmp_path / "0.csv").read_text().splitlines()
+    short.write_text("\n".join(lines[:9]) + "\n")
+    louder = write(tmp_path / "louder.csv", {"u": 2 * U, "y": output(2 * U, natural=8.0, seed=1)})
+    roles = ("--input", "u", "--output", "y")
+    for files, bad in (
+        ([*good, still], still),
+        ([still, *good], still),
+        ([*good, str(short)], str(short)),
+        ([good[0], louder, str(short)], str(short)),
+    ):
+        done = run(*files, *roles)
+        assert done.exit_code == 2, done.stdout
+        assert repr(Path(bad).name) in done.stderr
+        assert "inf" not in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def test_records_that_are_not_alike_are_named_by_their_files(tmp_path):
+    one = write(tmp_path / "record 1.csv", {"u": U, "y": output(U, natural=8.0, seed=1)})
+    other = write(tmp_path / "other.csv", {"u": U[::-1], "y": output(U, natural=8.0, seed=2)})
+    done = run(one, other, "--input", "u", "--output", "y")
+    assert "input 'u' of 'other.csv' differs from that of 'record 1.csv' by" in done.stderr
+    (tmp_path / "day 2").mkdir()
+    same = write(tmp_path / "day 2" / "record 1.csv", {"u": U, "y": output(U, natural=8.0, seed=1)})
+    done = run(one, same, "--input", "u", "--output", "y")
+    assert f"{one!r} and {same!r} hold the same samples" in done.stderr
+    done = run(one, one, "--input", "u", "--output", "y", "--together")
+    assert f"{one!r} and {one!r} hold the same samples" in done.stderr

@@ -87,6 +87,9 @@ def test_both_at_once(folder):
     [
         (["old.json"], "nothing to compare the result with"),
         (["old.json", "nowhere.csv"], "nowhere.csv"),
+        (["old.json", "--against", "new.json", "--fit", "90"], "--fit is about a record"),
+        (["old.json", "--against", "new.json", "--stamps", "log"], "--stamps is about a record"),
+        (["old.json", "right.csv", "--sweep", "0"], "greater than or equal to 1"),
         (["right.csv", "right.csv"], "not a result"),
         (["old.json", "right.csv", "--noise-ratio", "0.5"], "noise_ratio = 0.5"),
         (["old.json", "right.csv", "--json", "old.json"], "old.json"),
@@ -122,3 +125,24 @@ def test_an_input_beyond_the_identified_amplitude_is_said(capsys, tmp_path):
     assert "'u' moves the output by up to 2.85" in shown
     (output,) = json.loads((tmp_path / "v.json").read_text())["outputs"]
     assert [finding["code"] for finding in output["findings"]] == ["beyond_reach"]
+
+
+def test_an_older_result_in_other_units_is_converted_or_refused(folder, capsys, tmp_path):
+    words = ("--unit", "u=rad", "--unit", "y=rad", "--json")
+    rows = [line.split(",") for line in (folder / "right.csv").read_text().splitlines()[2:]]
+    turned = [f"{t},{np.radians(float(u))},{np.radians(float(y))}" for t, u, y in rows]
+    (tmp_path / "rad.csv").write_text("time,u,y\n" + "\n".join(turned) + "\n")
+    channels = ("--input", "u", "--output", "y")
+    result = tmp_path / "rad.json"
+    assert run("identify", tmp_path / "rad.csv", *channels, *words, result) == 0
+    capsys.readouterr()
+    assert run("validate", result, "--against", folder / "old.json") == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if " noise_std " in x]
+    assert "rad" in line
+    assert "deg" not in line
+    volts = tmp_path / "volts.json"
+    words = ("--unit", "u=rad", "--unit", "y=V", "--json")
+    assert run("identify", tmp_path / "rad.csv", *channels, *words, volts) == 0
+    capsys.readouterr()
+    assert run("validate", volts, "--against", folder / "old.json") == 2
+    assert "cannot be converted; compare results in like units" in capsys.readouterr().err

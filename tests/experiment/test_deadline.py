@@ -11,7 +11,7 @@ from hmpim.errors import RigError
 from hmpim.experiment import ManualClock, OutlivingRig, RunLog, RunOptions, Watch, run
 from hmpim.experiment.deadline import Deadline
 from hmpim.formats.recording import read_recording
-from hmpim.rigs import SystemClock
+from hmpim.rigs import Sensor, SystemClock
 from hmpim.stimulus import Limits, Sine, Stimulus
 
 LIMITS = Limits(position=3.0, velocity=20.0, acceleration=2000.0, unit="deg")
@@ -176,3 +176,21 @@ def test_commands_do_not_go_all_at_once_after_a_pause_of_the_computer():
     sent.clear()
     run(rig, SINE, options=RunOptions(clock=clock, watch=Watch(late=None)))
     assert len(sent) == SINE.samples
+
+
+def test_a_simulation_cannot_hang_and_starts_no_thread(monkeypatch):
+    started = []
+    start = Deadline._start
+
+    def counted(deadline):
+        started.append(deadline)
+        start(deadline)
+
+    monkeypatch.setattr(Deadline, "_start", counted)
+    before = signal.getsignal(signal.SIGINT)
+    run(Sensor(delay=0.05), SINE, rng=1)
+    assert not started
+    rig = Hanging(lambda: None, place="nowhere")
+    run(rig, SINE, options=RunOptions(clock=ManualClock()))
+    assert len(started) == 2  # to play, and to stop
+    assert signal.getsignal(signal.SIGINT) is before

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 from hmpim.errors import ArgumentError, HmpimError
 from hmpim.formats.readers.protocol import need
 
-__all__ = ["Finished", "Pool", "dask_pool", "here_pool"]
+__all__ = ["Finished", "Pool", "check_workers", "dask_pool", "here_pool"]
 
 _AHEAD = 2
 """Tasks for each thread that are given out before the first is back: none waits for its next."""
@@ -233,6 +233,18 @@ def _finished(task: Job, future: Any) -> Finished | None:
     return Finished(task=task, done=done)
 
 
+def check_workers(workers: int | None) -> None:
+    """Refuse a number of processes that cannot be started.
+
+    Raises
+    ------
+    ArgumentError
+        If it is negative, or beyond 1024.
+    """
+    if workers is not None and not 0 <= workers <= 1024:
+        raise ArgumentError(f"workers = {workers}; give a number of processes, or 0")
+
+
 def _nothing() -> None:
     """What a cluster of somebody else asks to be done for it."""
 
@@ -263,6 +275,7 @@ def dask_pool(
     ArgumentError
         If there is no such scheduler, it has no workers, or they have no hmpim.
     """
+    check_workers(workers)
     distributed = need("distributed", extra="batch", what="a batch of records")
     for name in ("distributed", "distributed.client"):  # Dask gives the second a level of its own
         logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -14,7 +14,7 @@ from hmpim.arguments import checked
 from hmpim.batch.addresses import Address, File, addresses_of, find_files
 from hmpim.batch.metadata import Beside, read_metadata
 from hmpim.batch.parts import PARTS, Known, open_folder, write_part
-from hmpim.batch.pool import Finished, Pool, dask_pool, here_pool
+from hmpim.batch.pool import Finished, Pool, check_workers, dask_pool, here_pool
 from hmpim.batch.pooled import identify_groups
 from hmpim.batch.reading import read_records
 from hmpim.batch.request import Request
@@ -68,8 +68,7 @@ class Cluster:
                 f"per_task = {self.per_task} records is not a task size; give 1 to 10000, "
                 "usually 50 to 200"
             )
-        if self.workers is not None and not 0 <= self.workers <= 1024:
-            raise ArgumentError(f"workers = {self.workers}; give a number of processes, or 0")
+        check_workers(self.workers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

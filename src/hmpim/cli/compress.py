@@ -115,7 +115,8 @@ def compress(
                 every=sweep == "all",
             )
             window = lags if joined is None else joined.lags
-            runs = runs_of(given, (input_, output), lags=window, bias=bias)
+            names = [repr(str(path))] * len(given)
+            runs = runs_of(given, names, (input_, output), lags=window, bias=bias)
         joined = runs if joined is None else _join(joined, runs, (records[0], path), bias)
     if joined is None:  # Typer asks for one record at least
         return
@@ -143,15 +144,19 @@ def _refuse_options(compressed: Path, about_samples: Mapping[str, object]) -> No
             )
 
 
-def refuse_twice(joined: "Statistics") -> None:
-    """Refuse a run that counts twice, which would make error bars too small."""
+def refuse_twice(joined: "Statistics", names: Sequence[str] | None = None) -> None:
+    """Refuse a run that counts twice, which would make error bars too small.
+
+    `names` are what messages call each run, numbers from 1 where there are none.
+    """
     seen: dict[bytes, int] = {}
     for place, run in enumerate(joined.runs, start=1):
         first = seen.setdefault(run.vu.tobytes() + run.level.tobytes(), place)
         if first != place:
+            called = names or [f"run {k}" for k in range(1, place + 1)]
             raise ArgumentError(
-                f"runs {first} and {place} hold the same samples; one record given twice is not "
-                "two runs, so leave one out"
+                f"{called[first - 1]} and {called[place - 1]} hold the same samples; "
+                "one record given twice is not two runs, so leave one out"
             )
 
 
@@ -207,6 +212,7 @@ def _join(
 
 def runs_of(
     given: "Sequence[Record]",
+    names: Sequence[str],
     named: tuple[str | None, str | None],
     *,
     lags: int | None = None,
@@ -214,20 +220,23 @@ def runs_of(
 ) -> "Statistics":
     """Compress each record to a run, with the window of the first; the runs joined.
 
-    `named` are the channels of input and output; None for the only one that there is.
+    `names` are what messages call each record. `named` are the channels of input and output; None
+    for the only one that there is.
     """
     from hmpim.identify import compress as compressed
+    from hmpim.identify.records.alike import naming
 
     runs: list[Statistics] = []
     with working("Compressing"):
-        for record in given:
+        for name, record in zip(names, given, strict=True):
             source, answer = named
-            channels = (
-                source or _only(record.inputs, "--input"),
-                answer or _only(record.outputs, "--output"),
-            )
             window = runs[0].lags if runs else lags
-            runs.append(compressed(record, lags=window, channels=channels, bias=bias.value))
+            with naming(name, arguments=True):
+                channels = (
+                    source or _only(record.inputs, "--input"),
+                    answer or _only(record.outputs, "--output"),
+                )
+                runs.append(compressed(record, lags=window, channels=channels, bias=bias.value))
     return runs[0].join(*runs[1:])
 
 

@@ -168,4 +168,7 @@ def _pair(
     wanted = " ".join(
         f"--{name} {value}" for name, value in (("output", output), ("input", input_)) if value
     )
-    raise ArgumentError(f"{wanted} fits {len(fitting)} pairs of the result, which has {known}")
+    raise ArgumentError(
+        f"{wanted} fits {len(fitting)} pairs of the result, which has {known}; give --output and "
+        "--input of one of them"
+    )

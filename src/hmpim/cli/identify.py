@@ -250,7 +250,7 @@ def identify(
     )
     about = about_of(title, under_test, test, operator, date)
     if together and compressed is None:
-        compressed = _joined(given, named, single)
+        compressed = _joined(given, _named(records, given), named, single)
     elif len(given) > 1:
         _check_single(len(given), single)
         identify_several(
@@ -291,6 +291,7 @@ def identify(
 
 def _joined(
     given: "Sequence[Record]",
+    paths: Sequence[Path],
     named: tuple[str | None, str | None],
     options: Mapping[str, object],
 ) -> "Statistics":
@@ -301,8 +302,9 @@ def _joined(
             "or give more"
         )
     _check_single(len(given), {name: options[name] for name in ("--reference", "--holdout")})
-    joined = runs_of(given, named)
-    refuse_twice(joined)
+    names = [repr(str(path)) for path in paths]
+    joined = runs_of(given, names, named)
+    refuse_twice(joined, names)
     return joined
 
 

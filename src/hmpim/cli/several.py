@@ -1,13 +1,10 @@
 """``hmpim identify a.csv b.csv …``: repeats of one stimulus, or one stimulus at several levels."""
 
-import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hmpim.cli.terminal import output_console, working
-from hmpim.errors import RecordError
 
 if TYPE_CHECKING:
     from hmpim.identify import Levels
@@ -34,9 +31,10 @@ def identify_several(
     from hmpim.report.several import levels_report, repeats_report
 
     names = [path.name for path in paths]
-    with _files_named(names), working(f"Identifying {len(records)} records"):
-        if same_at_levels(records):
-            levels = identify_levels(records, intersample=intersample)
+    files = names if len(set(names)) == len(names) else [str(path) for path in paths]
+    with working(f"Identifying {len(records)} records"):
+        if same_at_levels(records, names=files):
+            levels = identify_levels(records, intersample=intersample, names=files)
             if not quiet:
                 print_levels(levels, names, output_console())
             if json is not None:
@@ -44,25 +42,13 @@ def identify_several(
             if report is not None:
                 levels_report(levels, names, report, about=about, notes=notes)
             return
-        repeats = identify_repeats(records, intersample=intersample)
+        repeats = identify_repeats(records, intersample=intersample, names=files)
     if not quiet:
         print_repeats(repeats, output_console())
     if json is not None:
         _write(repeats.to_dict(), json)
     if report is not None:
         repeats_report(repeats, names, report, about=about, notes=notes)
-
-
-@contextmanager
-def _files_named(names: Sequence[str]) -> Iterator[None]:
-    """Call records by their files in what is refused, where they are counted from 0."""
-    try:
-        yield
-    except RecordError as error:
-        words = re.sub(r"\brecords (\d+) and (\d+)\b", r"record \1 and record \2", str(error))
-        raise RecordError(
-            re.sub(r"\brecord (\d+)\b", lambda found: repr(names[int(found[1])]), words)
-        ) from None
 
 
 def _levels_dict(levels: "Levels") -> dict[str, Any]:

@@ -69,7 +69,9 @@ def validate(
     to: To = None,
     sweep: Annotated[
         int | None,
-        typer.Option("--sweep", metavar="N", help="Use this one of several sweeps in a log."),
+        typer.Option(
+            "--sweep", metavar="N", min=1, help="Use this one of several sweeps in a log."
+        ),
     ] = None,
     stamps: StampChoice = Stamps.AUTO,
     sheet: Sheet = None,
@@ -87,6 +89,14 @@ def validate(
     if record is None and against is None:
         raise ArgumentError(
             "there is nothing to compare the result with; give a RECORD, or --against OLD"
+        )
+    if record is None:
+        _check_of_record(
+            {
+                **{"--fit": fit, "--fs": fs, "--time": time, "--unit": unit, "--from": from_},
+                **{"--to": to, "--sweep": sweep, "--sheet": sheet},
+                "--stamps": None if stamps is Stamps.AUTO else stamps,
+            }
         )
     check_files(
         reads={"the result": result, "the record": record, "the older result": against},
@@ -128,6 +138,13 @@ def validate(
         write_text(json, dumps(figures, indent=1, allow_nan=False) + "\n")
     if not figures["passed"]:
         raise typer.Exit(NOT_MET)
+
+
+def _check_of_record(options: Mapping[str, object]) -> None:
+    """Refuse options that are about a record where none is given."""
+    for option, given in options.items():
+        if given is not None:
+            raise ArgumentError(f"{option} is about a record, and none is given; give a RECORD")
 
 
 def _read(record: Path, found: "Identification", how: Mapping[str, Any]) -> Any:

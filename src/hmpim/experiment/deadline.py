@@ -26,8 +26,9 @@ class Deadline:
     """Breaks off what does not return in time; a context manager, entered where that is called.
 
     In the main thread a wait is broken off wherever Python code waits: for a socket, a serial
-    port, a lock. A thread looks at the clock and signals. Compiled code that does not return, and
-    anything in another thread, cannot be broken off: `instead` is called then.
+    port, a lock. A thread looks at the clock and signals, from the first call on. Compiled code
+    that does not return, and anything in another thread, cannot be broken off: `instead` is called
+    then.
 
     Parameters
     ----------
@@ -54,18 +55,15 @@ class Deadline:
         self._over = threading.Event()
         self._before: Any = None
         self._main = False
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> "Deadline":
-        self._main = threading.current_thread() is threading.main_thread()
-        if self._main:
-            self._before = signal.signal(signal.SIGINT, self._came)
-        self._thread = threading.Thread(target=self._watch, daemon=True, name="deadline")
-        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
-        self._thread.join(_AGAIN)  # not for ever: what it called instead may hang, too
+        if self._thread is not None:
+            self._thread.join(_AGAIN)  # not for ever: what it called instead may hang, too
         if self._main and self._before is not None:
             signal.signal(signal.SIGINT, self._before)
 
@@ -78,6 +76,8 @@ class Deadline:
         RigError
             With the message, if it was broken off, or returned after it could not be.
         """
+        if self._thread is None:
+            self._start()
         with self._lock:
             self._busy, self._overdue, self._due = True, False, self._clock.now() + seconds
         try:
@@ -94,6 +94,14 @@ class Deadline:
         with self._lock:
             if self._busy:
                 self._due = min(self._due, self._clock.now() + seconds)
+
+    def _start(self) -> None:
+        """Begin to look; a run in which nothing can hang never does."""
+        self._main = threading.current_thread() is threading.main_thread()
+        if self._main:
+            self._before = signal.signal(signal.SIGINT, self._came)
+        self._thread = threading.Thread(target=self._watch, daemon=True, name="deadline")
+        self._thread.start()
 
     def _watch(self) -> None:
         last, instead = math.inf, self._instead

@@ -174,8 +174,6 @@ def _runs(wish: _Wish) -> tuple[list[Record], bool]:
     Also says whether the file states the roles itself, as our own do.
     """
     file, fs, options = wish.path, wish.fs, wish.options
-    if fs is not None and not (np.isfinite(fs) and fs > 0):
-        raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")
     logs = open_logs(
         file,
         layout=Layout(time=wish.time, fs=fs, stamps=options.stamps, sheet=options.sheet),

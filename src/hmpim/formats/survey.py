@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 
 from hmpim.errors import FormatError
-from hmpim.formats.readers import Contents, Layout, reader_for
+from hmpim.formats.readers import Contents, Layout, check_used, reader_for
 from hmpim.record import (
     Channel,
     Description,
@@ -79,6 +79,7 @@ def survey(path: str | PathLike[str], *, layout: Layout | None = None) -> Survey
     """
     file, layout = Path(path), layout or Layout()
     reader = reader_for(file)
+    check_used(layout, file.name, reader)
     contents = reader.channels(file, layout)
     names = [c.name for c in contents.channels if not c.holds]
     unread = tuple((c.name, c.holds) for c in contents.channels if c.holds)

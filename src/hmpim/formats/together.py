@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, FormatError, RecordError
-from hmpim.formats.readers import ChannelInfo, Contents, Layout, Reader, listed, reader_for
+from hmpim.formats.readers import (
+    ChannelInfo,
+    Contents,
+    Layout,
+    Reader,
+    check_used,
+    listed,
+    reader_for,
+)
 from hmpim.formats.roles import find_channel
 from hmpim.record import Channel, ClockOffset, Finding, Series, clock_offset
 from hmpim.record.mend import mend
@@ -145,6 +153,7 @@ def open_logs(
     FormatError
         If a file cannot be read, or does not hold the common channel.
     """
+    check_used(layout, path.name, reader_for(path), beside=[reader_for(one) for one in beside])
     logs = [_opened(path, layout)]
     logs += [_opened(other, Layout(stamps=layout.stamps)) for other in beside]
     if common is not None:

@@ -7,19 +7,25 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.arguments import checked, generator, numbers_of
+from hmpim.arguments import check_size, checked, generator, numbers_of
 from hmpim.errors import ArgumentError
 from hmpim.model.chain import Chain, Readout, chain_of, run_chain
 from hmpim.model.driven import driven
 from hmpim.model.filters import in_z
 from hmpim.model.mode import Mode, modes_of
-from hmpim.model.nonlinear import NonlinearPart, followed_command, nonlinear_effect
+from hmpim.model.nonlinear import (
+    NonlinearPart,
+    excursion,
+    farthest,
+    followed_command,
+    nonlinear_effect,
+)
 from hmpim.model.response import RationalDelay, response
 from hmpim.model.sampled import prepare_input
 from hmpim.model.spread import Spread
 from hmpim.record import Intersample
 
-__all__ = ["Model", "frequency_response", "simulate"]
+__all__ = ["Model", "frequency_response", "simulate", "simulate_with_reach"]
 
 
 @checked
@@ -98,6 +104,7 @@ class Model:
             object.__setattr__(self, name, coefficients)
         for name in ("delay", "scale_factor", "bias", "noise_std", "hold_phase"):
             numbers_of(name, getattr(self, name))
+        check_size("delay", float(self.delay), "s", added=True)
         _check_readout(self)
         if self.intersample == "sampled":
             _check_filter(self)
@@ -377,16 +384,56 @@ def simulate(
     part = model.nonlinear
     if part is not None and intersample != model.intersample:
         part = replace(part, between=intersample)
+    linear, effect = _driven(model, part, samples, fs, intersample)
+    y = _joined(model, linear, effect)
+    if rng is not None:
+        y = y + model.noise_std * generator(rng).standard_normal(y.size)
+    return np.asarray(y)
+
+
+def simulate_with_reach(
+    model: Model, u: NDArray[np.float64], *, fs: float
+) -> tuple[NDArray[np.float64], float]:
+    """Output as `simulate` has it, (n,), and how far the input takes the nonlinear part.
+
+    A force within the dynamics, which takes long to follow, is followed once for both.
+
+    Raises
+    ------
+    ArgumentError
+        If the model has no nonlinear part, or the dynamics are none in which it can act.
+    """
+    part = model.nonlinear
+    if part is None:
+        raise ArgumentError("the model has no nonlinear part; simulate it")
+    if part.at == "command":
+        reach = excursion(part, model.system, u, fs, model.intersample)
+        return simulate(model, u, fs=fs, intersample=model.intersample), reach
+    linear, effect = _driven(model, part, u, fs, model.intersample)
+    return _joined(model, linear, effect), farthest(part, linear, effect)
+
+
+def _driven(
+    model: Model,
+    part: NonlinearPart | None,
+    samples: NDArray[np.float64],
+    fs: float,
+    intersample: Intersample,
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Output of the linear part without the bias, (n,), and what the nonlinear part adds."""
     if part is not None and part.kind == "rate_limit":
         samples = followed_command(part, samples, fs)
     source = prepare_input(samples, intersample)
     y = driven(model.system, source, fs)
-    if part is not None:
-        y = y + nonlinear_effect(part, model.system, samples, source, fs)
-    y = y + model.bias
-    if rng is not None:
-        y = y + model.noise_std * generator(rng).standard_normal(y.size)
-    return np.asarray(y)
+    if part is None:
+        return y, None
+    return y, nonlinear_effect(part, model.system, samples, source, fs)
+
+
+def _joined(
+    model: Model, linear: NDArray[np.float64], effect: NDArray[np.float64] | None
+) -> NDArray[np.float64]:
+    return (linear if effect is None else linear + effect) + model.bias
 
 
 def _run(

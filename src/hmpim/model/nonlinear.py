@@ -37,6 +37,7 @@ __all__ = [
     "NonlinearPart",
     "Place",
     "excursion",
+    "farthest",
     "followed_command",
     "force_step",
     "forced",
@@ -227,10 +228,15 @@ def excursion(
         return float(np.max(np.abs(fine)))
     source = prepare_input(u, intersample)
     z = driven(system, source, fs)
-    if part.at == "force":
-        effect = nonlinear_effect(part, system, u, source, fs)
-        z = z if part.kind == "friction" else z + effect
-    return float(np.max(np.abs(z)))
+    effect = nonlinear_effect(part, system, u, source, fs) if part.at == "force" else None
+    return farthest(part, z, effect)
+
+
+def farthest(part: NonlinearPart, linear: _Real, effect: _Real | None) -> float:
+    """Largest deflection by a part that is not in front of the dynamics, from what it adds."""
+    if effect is None or part.at != "force" or part.kind == "friction":
+        return float(np.max(np.abs(linear)))
+    return float(np.max(np.abs(linear + effect)))
 
 
 def friction(part: NonlinearPart, system: RationalDelay, fine: _Real, fs: float) -> _Real:

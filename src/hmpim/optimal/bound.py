@@ -177,6 +177,7 @@ def _programme(
     The prices are those of the combinations and of the limits; the first add up to that share.
     """
     scale = rows.max(axis=1)
+    size = scale.min()  # the solver's tolerances are absolute
     count = rows.shape[1]
     solved = scipy.optimize.linprog(
         np.append(np.zeros(count), 1.0),
@@ -186,13 +187,13 @@ def _programme(
                 np.column_stack([shares, -np.ones(len(shares))]),
             ]
         ),
-        b_ub=np.concatenate([-1.0 / scale, np.zeros(len(shares))]),
+        b_ub=np.concatenate([-size / scale, np.zeros(len(shares))]),
         method="highs-ds",
     )
     if solved.x is None:
         return None
     prices = -np.asarray(solved.ineqlin.marginals)
-    spectrum = np.maximum(solved.x[:-1], 0.0)
+    spectrum = np.maximum(solved.x[:-1], 0.0) / size
     paid = np.maximum(prices[len(rows) :], 0.0)
     # of limits, they add up to 1
     return spectrum, np.maximum(prices[: len(rows)], 0.0) / scale / paid.sum(), paid / paid.sum()

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hmpim.arguments import checked, size_of
+from hmpim.arguments import check_size, checked, size_of
 from hmpim.errors import ArgumentError
 from hmpim.model import Model
 from hmpim.stimulus import Limits
@@ -59,14 +59,18 @@ _PAST = 1.18
 _SETTLED = 2.2
 """Record over delay and settling time; `hmpim.identify` doubts what is read off less than 2."""
 
+_MOST_SNR = 1e15
+"""Largest output over the noise: what double precision tells apart."""
+
 FloatArray = NDArray[np.float64]
 
 
-def _positive(name: str, value: float, unit: str = "") -> None:
+def _positive(name: str, value: float, unit: str = "", *, added: bool = False) -> None:
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if not real or not (math.isfinite(value) and value > 0):
         shown = f"{value!r} {unit}".rstrip()
         raise ArgumentError(f"{name} = {shown} must be a positive, finite number")
+    check_size(name, value, unit, added=added)
 
 
 @checked
@@ -104,7 +108,7 @@ class RoughModel:
 
     def __post_init__(self) -> None:
         if self.delay != 0:
-            _positive("delay", self.delay, "s")
+            _positive("delay", self.delay, "s", added=True)
         _positive("natural_frequency", self.natural_frequency, "Hz")
         _positive("damping_ratio", self.damping_ratio)
         _positive("size of scale_factor", abs(self.scale_factor))
@@ -118,7 +122,9 @@ class RoughModel:
     def settling(self) -> float:
         """Slowest time constant, in s."""
         beyond = math.sqrt(max(self.damping_ratio**2 - 1.0, 0.0))
-        return 1.0 / (self.omega * (self.damping_ratio - beyond))
+        if beyond > 0.0:
+            return (self.damping_ratio + beyond) / self.omega  # without cancellation
+        return 1.0 / (self.omega * self.damping_ratio)
 
     @classmethod
     def of(cls, model: Model) -> "RoughModel":
@@ -266,6 +272,8 @@ class ModelRange:
                     f"range of {name} = ({low!r}, {high!r}) does not rise from a positive number; "
                     "give the lower one first"
                 )
+            for end in given:
+                check_size(f"range of {name}", end, added=name == "delay")
 
     def models(self, around: RoughModel, *, finer: int = 1) -> tuple[RoughModel, ...]:
         """Models that stand for the range, its ends included, `finer` times as many each way."""
@@ -346,6 +354,7 @@ class Wish:
                 "give a position, velocity or acceleration limit"
             )
         self._check_range()
+        self._check_noise()
         highest = max(m.natural_frequency for m in self.models())
         if highest > 0.3 * self.fs:
             raise ArgumentError(
@@ -363,6 +372,18 @@ class Wish:
                     f"{name} = {rough:g} is outside its range, {given[0]:g} to {given[1]:g}; give "
                     "one within it"
                 )
+
+    def _check_noise(self) -> None:
+        """Refuse noise that double precision does not tell from none."""
+        limits, half = self.limits, 0.5 * self.duration
+        travel = min(limits.position, limits.velocity * half, limits.acceleration * half**2)
+        largest = abs(self.model.scale_factor) * travel
+        if math.isfinite(largest) and largest > _MOST_SNR * self.noise_std:
+            raise ArgumentError(
+                f"noise_std = {self.noise_std:g} is nothing beside an output of up to {largest:g} "
+                f"(scale factor {self.model.scale_factor:g}, travel {travel:g}); give the noise "
+                "and the scale factor in one unit of the output"
+            )
 
     def models(self, *, finer: int = 1) -> tuple[RoughModel, ...]:
         """Models over the range, the accuracy being wanted of each."""

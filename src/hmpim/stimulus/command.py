@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmpim.arguments import check_size
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray, Peaks
@@ -57,6 +58,7 @@ def check_resolution(resolution: float) -> float:
         raise ArgumentError(
             f"resolution = {resolution!r} must be 0 (none) or a positive, finite step"
         )
+    check_size("resolution", number)
     return number
 
 

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from hmpim.arguments import checked, generator, size_of
+from hmpim.arguments import check_size, checked, generator, size_of
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.base import Superposed, room_beside_base, shuttle_for
 from hmpim.stimulus.command import leave_room
@@ -128,6 +128,8 @@ def design(
     rate = check_positive("fs", fs, "Hz")
     _check_frequencies(low, high, length, rate)
     size_of(length, rate)
+    check_size("duration", length, "s")
+    check_size("fs", rate, "Hz")
     if rng is not None:
         generator(rng)
     check_limits_given(limits)
@@ -304,4 +306,5 @@ def _seconds(name: str, given: float | Literal["auto"]) -> float | None:
         return None
     if isinstance(given, str) or not (math.isfinite(given) and given >= 0.0):
         raise ArgumentError(f"{name} = {given!r} must be 'auto', 0 or a positive time in seconds")
+    check_size(name, given, "s")
     return float(given)

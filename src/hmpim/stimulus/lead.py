@@ -421,6 +421,8 @@ def gentlest_between(
     first: FloatArray, last: FloatArray, beside: Peaks, limits: Limits, longest: float
 ) -> Quintic | None:
     """The gentlest quintic beside its neighbour's peaks, of those that keep the limits."""
+    if not longest > 0.0:
+        return None
     scales = (beside.position / beside.velocity, beside.velocity / beside.acceleration)
     neighbour = np.array([beside.position, beside.velocity, beside.acceleration])
     bounds = np.array([getattr(limits, name) for name in QUANTITIES])

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from hmpim.arguments import checked
+from hmpim.arguments import check_size, checked
 from hmpim.errors import ArgumentError, UnitError
 from hmpim.stimulus.motion import Peaks
 from hmpim.units import check_unit, conversion_factor, rate_label
@@ -28,7 +28,8 @@ class Limits:
     Raises
     ------
     ArgumentError
-        If one of them is NaN, zero or negative, or not a number.
+        If one of them is NaN, zero or negative, not a number, or too large or small to compute
+        with.
     UnitError
         If the unit is not known.
 
@@ -59,6 +60,7 @@ class Limits:
                     f"{name} limit = {shown} bounds nothing that could move; "
                     "give a positive number, or leave it out for no limit"
                 )
+            check_size(f"{name} limit", value, rate_label(self.unit, order))
             object.__setattr__(self, name, value)
 
     @checked

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from hmpim.arguments import check_size
 from hmpim.errors import ArgumentError, LimitsError
 from hmpim.stimulus.limits import QUANTITIES, Limits, three_digits
 from hmpim.stimulus.motion import FloatArray
@@ -215,7 +216,9 @@ def signal_to_noise(
         if np.any(variance <= 0.0):
             raise ArgumentError("the noise's density must be positive at all frequencies")
     else:
-        variance = np.full(frequency.size, check_positive("noise", noise, stimulus.unit) ** 2)
+        std = check_positive("noise", noise, stimulus.unit)
+        check_size("noise", std, stimulus.unit)
+        variance = np.full(frequency.size, std**2)
     smooth = _averaged(frequency, power, _spacing(stimulus))
     ratio = smooth * r / (stimulus.fs * variance)
     with np.errstate(divide="ignore"):

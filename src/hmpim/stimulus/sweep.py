@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.arguments import checked
+from hmpim.arguments import check_size, checked
 from hmpim.errors import ArgumentError
 from hmpim.stimulus.motion import FloatArray, Motion, at_rest_outside
 
@@ -73,6 +73,8 @@ def check_band(band: tuple[float, float]) -> tuple[float, float]:
         )
     low = check_positive("start of the band", first, "Hz")
     high = check_positive("end of the band", last, "Hz")
+    check_size("start of the band", low, "Hz")
+    check_size("end of the band", high, "Hz")
     if low >= high:
         raise ArgumentError(
             f"band = ({first}, {last}) Hz does not rise; give the lower frequency first"

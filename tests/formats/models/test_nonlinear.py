@@ -111,7 +111,9 @@ def test_mujoco_rubs_as_predicted(step, within, tmp_path):
     mujoco = pytest.importorskip("mujoco")
     model = model_with("friction", saturation_high=None)
     (file,) = export(result_of(model), to="mujoco", path=tmp_path / "a.xml", timestep=step)
-    assert "The file includes Coulomb friction (equal to the restoring force at" in file.read_text()
+    assert (
+        "The file includes Coulomb friction (it equals the restoring force at" in file.read_text()
+    )
     world = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(world)
     t = np.arange(0.0, 6.0, step)

@@ -180,3 +180,11 @@ def test_what_an_integrator_had_before_the_record_is_part_of_its_bias(start, dou
     codes = {w.code for w in pair.warnings if "bias" in w.parameters and w.severity == "doubt"}
     assert pair.structure == "integrator"
     assert ("initial_transient" in codes) == doubted
+
+
+def test_a_line_at_half_the_rate_is_named_too():
+    u = np.tile([0.0, 1.0], 50)
+    result = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": u}, fs=10.0))
+    codes = {warning.code for warning in result["y", "u"].warnings}
+    assert "few_lines" in codes
+    assert "check_failed" not in codes

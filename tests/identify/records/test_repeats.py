@@ -158,7 +158,7 @@ def test_what_scatters_is_said_once_for_all_parameters() -> None:
 def test_copies_of_one_record_are_not_repeats() -> None:
     one = record(lagged() + 0.05 * np.random.default_rng(0).standard_normal(T.size))
     other = record(lagged() + 0.05 * np.random.default_rng(1).standard_normal(T.size))
-    with pytest.raises(RecordError, match="records 0 and 2 hold the same samples"):
+    with pytest.raises(RecordError, match="record 0 and record 2 hold the same samples"):
         identify_repeats([one, other, one], structures=STRUCTURES)
     alike = [
         record(one.outputs[0].values + 1e-4 * np.random.default_rng(k).standard_normal(T.size))
@@ -195,7 +195,7 @@ def test_what_are_no_repeats_is_refused() -> None:
     )
     with pytest.raises(RecordError, match="'y' is in 'mV' in record 1 and in 'V' in record 0"):
         identify_repeats([volts, millivolts])
-    check_channels([volts, unstated])
+    check_channels([volts, unstated], ["one", "other"])
     fast = Record.from_arrays({"u": U}, {"y": lagged()}, fs=2 * FS)
     with pytest.raises(RecordError, match="record 1 is at 200 Hz"):
         identify_repeats([good, fast])

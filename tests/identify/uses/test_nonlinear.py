@@ -20,6 +20,7 @@ from nonlinear_predictions import (
 
 import hmpim
 from hmpim.identify import Nonlinearity
+from hmpim.model.nonlinear import nonlinear_effect
 from hmpim.record import Finding
 
 
@@ -150,3 +151,24 @@ def test_until_the_gap_is_crossed_the_prediction_is_not_scored():
     first = int(np.argmax(found.scored))
     assert 4.0 < first / FS < 6.0
     assert hmpim.validate(result, recorded(drive, y, 3)).passed
+
+
+@pytest.mark.parametrize("kind", ["hardening", "friction"])
+def test_a_force_is_followed_once_for_a_prediction_and_once_for_a_validation(kind, monkeypatch):
+    result, record = found_of(kind), recorded(chirp(0.9), moved(kind, chirp(0.9)), 2)
+    model, (u,) = hmpim.to_model(result["y", "u"], fs=record.fs), record.inputs
+    whole = hmpim.simulate(model, u.values, fs=record.fs, intersample=model.intersample)
+    followed = []
+
+    def counted(*arguments):
+        followed.append(arguments)
+        return nonlinear_effect(*arguments)
+
+    monkeypatch.setattr("hmpim.model.model.nonlinear_effect", counted)
+    monkeypatch.setattr("hmpim.model.nonlinear.nonlinear_effect", counted)
+    predicted = hmpim.predict(result["y", "u"], record).predicted
+    assert len(followed) == 1
+    (output,) = hmpim.validate(result, record).outputs
+    assert len(followed) == 2
+    assert np.array_equal(predicted, whole)
+    assert np.array_equal(output.predicted, (whole - model.bias) + model.bias)

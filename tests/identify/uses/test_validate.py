@@ -9,6 +9,7 @@ from scipy import signal
 import hmpim
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import Bounds, compare
+from hmpim.units import conversion_factor
 
 LIMITS = hmpim.Limits(position=10, velocity=1000, acceleration=40000, unit="deg")
 SWEEP = hmpim.design(band=(0.1, 15), duration=8, fs=100, limits=LIMITS)
@@ -242,3 +243,44 @@ def test_results_of_different_units_are_not_compared(result):
     other = hmpim.identify(hmpim.run(replace(SENSOR, output_name="z"), SWEEP, rng=2))
     with pytest.raises(RecordError, match="no parameter in common"):
         compare(other, result)
+
+
+def in_units(record, u_unit, y_unit):
+    """The record with the values in other units: the sensor itself is in degrees."""
+    return replace(
+        record,
+        inputs=tuple(_in_unit(c, u_unit) for c in record.inputs),
+        outputs=tuple(_in_unit(c, y_unit) for c in record.outputs),
+    )
+
+
+def _in_unit(channel, unit):
+    factor = conversion_factor("deg", to=unit) if unit in ("deg", "rad", "mrad") else 1.0
+    return replace(channel, values=channel.values * factor, unit=unit)
+
+
+@pytest.mark.parametrize(
+    "units", [("deg", "rad"), ("rad", "deg"), ("mrad", "mrad"), ("", "rad"), ("rad", "rad")]
+)
+def test_figures_in_other_units_are_converted_before_they_are_compared(result, units):
+    record = hmpim.run(SENSOR, SWEEP, rng=61)
+    plain = compare(hmpim.identify(record), result)
+    there = compare(hmpim.identify(in_units(record, *units)), result)
+    back = compare(result, hmpim.identify(in_units(record, *units)))
+    assert [c.name for c in there] == [c.name for c in plain]
+    for same, other, reverse in zip(plain, there, back, strict=True):
+        assert other.deviations == pytest.approx(same.deviations, rel=1e-3, abs=1e-3)
+        assert reverse.deviations == pytest.approx(-same.deviations, rel=1e-3, abs=1e-3)
+        assert other.old.unit == other.new.unit
+
+
+def test_figures_without_a_unit_are_compared_as_they_are(result):
+    found = hmpim.identify(in_units(hmpim.run(SENSOR, SWEEP, rng=61), "", ""))
+    assert not any(change.changed for change in compare(found, result))
+    assert not any(change.changed for change in compare(result, found))
+
+
+def test_figures_whose_units_cannot_be_converted_are_not_compared(result):
+    found = hmpim.identify(in_units(hmpim.run(SENSOR, SWEEP, rng=61), "deg", "V"))
+    with pytest.raises(RecordError, match="scale factor of 'y' from 'u' is in 'V/deg', and in '1'"):
+        compare(found, result)

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from hmpim.errors import ArgumentError
 from hmpim.formats.models.refined import REFINE
 from hmpim.formats.models.source import LINEAR_PART, Source
 from hmpim.identify import left_out
-from hmpim.identify.result.digits import plus_minus
+from hmpim.identify.result.sizes import size_in_words
 from hmpim.model import Model, simulate
 from hmpim.model.nonlinear import NonlinearPart, excursion
 
@@ -26,7 +27,13 @@ _MOST_POLES = 6
 """Poles up to which a script steps a force: beyond, the coefficients lose their digits."""
 
 _SAMPLES = 2000
-"""Samples of the sweep on which a program is compared with the model."""
+"""Samples of the sweep on which a program is compared with the model, at least."""
+
+_MOST_SAMPLES = 100_000
+"""And at most: a second or two of stepping."""
+
+_CYCLES = 20.0
+"""Periods of its highest frequency that it lasts, after twice the delay, at any rate."""
 
 
 class LinearPartOnly(UserWarning):
@@ -42,7 +49,7 @@ def with_nonlinear_part(source: Source, to: str) -> tuple[Source, str | None]:
     part = source.model.nonlinear
     if part is None:
         return source, None
-    size = _size(part, source.model.output_unit)
+    size = size_in_words(part, (source.model.input_unit, source.model.output_unit))
     if not _carries(to, part, source.model):
         said = f"{LINEAR_PART}it omits {part.words} ({size})."
         linear = replace(source.model, nonlinear=None)
@@ -50,22 +57,6 @@ def with_nonlinear_part(source: Source, to: str) -> tuple[Source, str | None]:
     return replace(
         source, note=f"The file includes {part.words} ({size}){_how(source, part, to)}"
     ), None
-
-
-def _size(part: NonlinearPart, unit: str) -> str:
-    """The size in words."""
-    words = {
-        "backlash": "half the gap is",
-        "dead_zone": "half the width is",
-        "friction": "equal to the restoring force at a deflection of",
-        "rate_limit": "at most",
-    }
-    if part.kind not in words:
-        share = plus_minus(100.0 * abs(part.size), 100.0 * part.std)
-        return f"{share} % of the linear part at a deflection of {part.reach:.4g} {unit}".rstrip()
-    units = {"rate_limit": "per s", "dead_zone": ""}
-    size = f"{words[part.kind]} {plus_minus(part.size, part.std)} {units.get(part.kind, unit)}"
-    return size.rstrip()
 
 
 def _carries(to: str, part: NonlinearPart, model: Model) -> bool:
@@ -115,7 +106,13 @@ def _stepped_error(source: Source) -> float:
         hold_period=None,
     )
     highest = min(model.band or 0.2 * fs, 0.45 * fs)
-    t = np.arange(_SAMPLES) / fs
+    wanted = fs * (2.0 * max(model.delay, 0.0) + _CYCLES / highest)
+    t = np.arange(int(min(max(wanted, _SAMPLES), _MOST_SAMPLES))) / fs
+    if t[-1] <= 1.1 * model.delay:
+        raise ArgumentError(
+            f"fs = {fs:g} Hz is too fast for a program with a delay of {model.delay:.4g} s, which "
+            f"is {model.delay * fs:.3g} samples; give a lower rate with fs=... or --fs"
+        )
     u = np.sin(np.pi * highest * t**2 / t[-1])
     # The reach of a force is that of the whole output, which may resonate where x does not.
     share, seen = 1.0, part

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 
+from hmpim.arguments import check_size
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify import (
     Estimate,
@@ -22,6 +23,9 @@ __all__ = ["LINEAR_PART", "Source", "ascii_of", "identifier", "source_of"]
 
 LINEAR_PART = "The file holds the linear part alone: "
 """How the note of an export begins that lacks a nonlinearity."""
+
+_MOST_LATE = 1e7
+"""Samples that a program can keep: 80 MB."""
 
 _NEGLIGIBLE = 3.0
 """Standard deviations up to which a negative delay counts as none."""
@@ -146,6 +150,11 @@ class Source:
     def chain(self) -> Chain:
         """Return the model at the export's rate."""
         model = self.model if self.moved_before else self.causal()
+        if model.delay * self.fs > _MOST_LATE:
+            raise ArgumentError(
+                f"fs = {self.fs:g} Hz is too fast for a program: the delay of {model.delay:.4g} s "
+                f"is {model.delay * self.fs:.3g} samples, which it would keep; give a lower rate"
+            )
         return model.at_rate(self.fs, intersample=self.intersample)
 
 
@@ -187,7 +196,7 @@ def source_of(
             raise ArgumentError(
                 f"the result has {len(known)} models ("
                 + ", ".join(f"{p.output} from {p.input}" for p in known)
-                + "); choose one by its output and input"
+                + "); choose one with pair=(output, input), or --output and --input"
             )
         if not result.pairs:
             raise RecordError("the result has no pair of channels, so there is no model")
@@ -195,6 +204,7 @@ def source_of(
     rate = result.record.fs if fs is None else fs
     if not rate > 0:
         raise ArgumentError(f"fs = {rate!r} Hz is not a rate; give a positive number")
+    check_size("fs", rate, "Hz")
     model = to_model(chosen, fs=result.record.fs)
     return Source(
         name=identifier(name),

@@ -9,6 +9,7 @@ from hmpim.formats.readers.protocol import (
     Layout,
     Reader,
     Stamps,
+    check_used,
     listed,
     need,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "Layout",
     "Reader",
     "Stamps",
+    "check_used",
     "listed",
     "need",
     "reader_for",

@@ -50,7 +50,13 @@ def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]
 
 
 EXCEL = Reader(
-    format="Excel", sniff=sniff, channels=channels, read=read, extra="excel", foreign=True
+    format="Excel",
+    sniff=sniff,
+    channels=channels,
+    read=read,
+    extra="excel",
+    foreign=True,
+    uses=("sheet",),
 )
 
 

@@ -1,13 +1,15 @@
 """What a reader is: three functions and the facts that a person needs about its format."""
 
 import importlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
-from hmpim.errors import MissingExtraError
+from hmpim.arguments import check_size
+from hmpim.errors import ArgumentError, MissingExtraError
 from hmpim.record import Finding, Intersample, Series, Stopping
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "Layout",
     "Reader",
     "Stamps",
+    "check_used",
     "listed",
     "need",
 ]
@@ -48,6 +51,11 @@ class Layout:
     sheet : str or None
         Sheet of a workbook, or table of a file with several; the first if None.
 
+    Raises
+    ------
+    ArgumentError
+        If the rate is none.
+
     Examples
     --------
     >>> Layout(time="stamp").stamps
@@ -58,6 +66,15 @@ class Layout:
     fs: float | None = None
     stamps: Stamps = "auto"
     sheet: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.fs is None:
+            return
+        if not 0.0 < self.fs < math.inf:
+            raise ArgumentError(
+                f"fs = {self.fs} Hz is not a sampling rate; it must be positive and finite"
+            )
+        check_size("fs", self.fs, "Hz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +172,8 @@ class Reader:
         Extra of hmpim that installs what the reader needs; empty if nothing.
     foreign : bool
         True if code of others parses the bytes, so that it must run in a worker process.
+    uses : tuple of {'sheet', 'stamps'}
+        Parts of the layout that the format has a use for; the others are refused.
 
     Both `channels` and `read` raise `hmpim.errors.FormatError` for a file that is damaged, and
     `MissingExtraError` (by `need`) where a package is missing.
@@ -166,6 +185,38 @@ class Reader:
     read: Callable[[Path, Sequence[str], Layout], tuple[Series, ...]]
     extra: str = ""
     foreign: bool = False
+    uses: tuple[Literal["sheet", "stamps"], ...] = ("sheet", "stamps")
+
+
+def check_used(layout: Layout, file: str, reader: Reader, *, beside: Sequence[Reader] = ()) -> None:
+    """Refuse what a person says about a file whose format has no use for it.
+
+    Parameters
+    ----------
+    layout : Layout
+        What is said.
+    file : str
+        Name of the file.
+    reader : Reader
+        Its reader.
+    beside : sequence of Reader
+        Those of other files of the test, of which stamps are chosen as well.
+
+    Raises
+    ------
+    ArgumentError
+        If a sheet is named, or stamps are chosen, where there is no choice.
+    """
+    if layout.sheet is not None and "sheet" not in reader.uses:
+        raise ArgumentError(
+            f"sheet = {layout.sheet!r} is given, and {file!r} ({reader.format}) has no sheets; "
+            "leave it out"
+        )
+    if layout.stamps != "auto" and not any("stamps" in each.uses for each in (reader, *beside)):
+        raise ArgumentError(
+            f"stamps = {layout.stamps!r} is given, and {file!r} ({reader.format}) has one stamp a "
+            "message; leave it out"
+        )
 
 
 _LISTED = 20

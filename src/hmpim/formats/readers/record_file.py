@@ -65,4 +65,4 @@ def _info(track: Track, tracks: Sequence[Track]) -> ChannelInfo:
     )
 
 
-RECORD_FILE = Reader(format="hmpim record", sniff=sniff, channels=channels, read=read)
+RECORD_FILE = Reader(format="hmpim record", sniff=sniff, channels=channels, read=read, uses=())

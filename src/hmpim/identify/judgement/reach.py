@@ -243,6 +243,7 @@ def _at_the_line(evidence: Evidence) -> str:
     """Gain and phase at the only line, in words."""
     power = windowed_power(evidence.u)
     near = int(np.argmax(power)) + np.arange(-3, 4)
+    near = near[(near >= 0) & (near < power.size)]
     place = float(near @ power[near] / power[near].sum()) * evidence.fs / evidence.u.size
     value = complex(response(evidence.readings.system, np.array([place]))[0])
     return (

@@ -30,8 +30,8 @@ from hmpim.identify.nonlinear.rows import (
     with_row,
 )
 from hmpim.identify.result import Estimate
-from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.sizes import size_in_words
 from hmpim.identify.worth import MATERIAL, PART
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding, Intersample
@@ -255,21 +255,11 @@ def _within_reach(fit: Fit, steps: Real) -> Real:
 
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
     """State which nonlinearity is part of the model; the units are the input's and the output's."""
-    words: dict[Kind, str] = {
-        "backlash": "half its gap is",
-        "dead_zone": "half its width is",
-        "friction": "it equals the restoring force at a deflection of",
-    }
-    if one.kind in words:
-        unit = units[_UNIT[one.kind]]
-        size = f"{words[one.kind]} {plus_minus(one.size, one.std)} {unit}".rstrip()
-    else:
-        share = plus_minus(100.0 * abs(one.size), 100.0 * one.std)
-        size = f"{share} % of the linear part at the largest deflection"
     return Finding(
         code=one.kind,
-        message=f"The model includes {KIND_WORDS[one.kind]}: {size}. The figures are those of the "
-        "linear part. Include this effect in a simulation, or keep the stimulus away from it.",
+        message=f"The model includes {KIND_WORDS[one.kind]}: {size_in_words(one.part, units)}. "
+        "The figures are those of the linear part. Include this effect in a simulation, or keep "
+        "the stimulus away from it.",
         severity="info",
         parameters=(),
     )

@@ -16,7 +16,7 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
-from hmpim.identify.records.alike import check_channels
+from hmpim.identify.records.alike import check_channels, names_of, naming
 from hmpim.identify.result import Identification, PairIdentification, Parameters
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import in_words
@@ -157,6 +157,7 @@ def identify_levels(
     amplitudes: Sequence[float] | None = None,
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Levels:
     """Identify one test at several amplitudes, and find where it stops being linear (Fig. 22).
 
@@ -170,6 +171,8 @@ def identify_levels(
     intersample, structures
         As in `identify`. Each pair takes the structure found at the smallest amplitude at all
         levels, so that they can be compared.
+    names : sequence of str, optional
+        What messages call each record, such as its file; numbers from 0 by default.
 
     Returns
     -------
@@ -197,9 +200,13 @@ def identify_levels(
     """
     given = tuple(records)
     _check_number(len(given), len(given) if amplitudes is None else len(amplitudes), of="record")
-    check_channels(given)
+    called = names_of(given, names)
+    check_channels(given, called)
     linear = partial(identify, nonlinear="reported")
-    results = [linear(r, intersample=intersample, structures=structures) for r in given]
+    results = []
+    for name, record in zip(called, given, strict=True):
+        with naming(name):
+            results.append(linear(record, intersample=intersample, structures=structures))
     comparisons = []
     for pair in results[0].pairs:
         key = (pair.output, pair.input)

@@ -18,7 +18,7 @@ from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.records.alike import check_alike, check_apart
+from hmpim.identify.records.alike import check_alike, check_apart, names_of, naming
 from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
 from hmpim.identify.result import Estimate, FrequencyResponse, PairIdentification
 from hmpim.identify.result.error_bars import estimate, noise_estimate
@@ -40,6 +40,7 @@ def identify_repeats(
     *,
     intersample: Intersample | str = "auto",
     structures: Sequence[str] | None = None,
+    names: Sequence[str] | None = None,
 ) -> Repeats:
     """Identify each record, average, and test the stated errors against the scatter.
 
@@ -51,6 +52,8 @@ def identify_repeats(
         As in `identify`.
     structures : sequence of str, optional
         As in `identify`.
+    names : sequence of str, optional
+        What messages call each record, such as its file; numbers from 0 by default.
 
     Returns
     -------
@@ -81,13 +84,15 @@ def identify_repeats(
         raise RecordError(
             f"{len(given)} record is given; repeatability needs at least 2 of one stimulus"
         )
-    check_alike(given)
-    check_apart(given)
-    results = tuple(
-        identify(record, intersample=intersample, structures=structures) for record in given
-    )
+    called = names_of(given, names)
+    check_alike(given, called)
+    check_apart(given, called)
+    results = []
+    for name, record in zip(called, given, strict=True):
+        with naming(name):
+            results.append(identify(record, intersample=intersample, structures=structures))
     return Repeats(
-        results=results,
+        results=tuple(results),
         pairs=tuple(
             _pair(tuple(result[pair.output, pair.input] for result in results))
             for pair in results[0].pairs

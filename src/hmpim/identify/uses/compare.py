@@ -4,10 +4,12 @@ import math
 from dataclasses import dataclass
 
 from hmpim.arguments import checked
-from hmpim.errors import RecordError
+from hmpim.errors import RecordError, UnitError
 from hmpim.identify.chance import deviations
-from hmpim.identify.result import Estimate, Identification, Parameters
-from hmpim.identify.result.groups import EVERY
+from hmpim.identify.result import Estimate, Identification, PairIdentification
+from hmpim.identify.result.groups import EVERY, in_words
+from hmpim.identify.uses.gains import gain_unit, like_gains
+from hmpim.units import conversion_factor
 
 __all__ = ["Change", "compare"]
 
@@ -21,7 +23,7 @@ class Change:
     output, input, name : str
         Channels and name of the parameter.
     old, new : Estimate
-        In the older and in the newer result.
+        In the older and in the newer result, both in the unit of the newer one.
     deviations : float
         Difference over the standard deviation of the difference; 0 where an interval is open.
     limit : float
@@ -60,7 +62,12 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     Raises
     ------
     RecordError
-        If the results have no parameter in common.
+        If the results have no parameter in common, or one is in units that cannot be converted
+        into each other.
+
+    Notes
+    -----
+    Old figures are converted into the units of the new ones where both results state them.
 
     Examples
     --------
@@ -74,13 +81,13 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
     >>> [c.name for c in compare(found(0.101, 3), found(0.1, 4)) if c.changed][:1]
     ['delay']
     """
-    older = {(pair.output, pair.input): pair.parameters for pair in old.pairs}
-    none = Parameters()
+    older = {(pair.output, pair.input): pair for pair in old.pairs}
     both: list[tuple[str, str, str, Estimate, Estimate]] = [
-        (pair.output, pair.input, name, was, now)
+        (pair.output, pair.input, name, _converted(was, name, pair, before), now)
         for pair in new.pairs
+        if (before := older.get((pair.output, pair.input))) is not None
         for name in EVERY
-        if (was := getattr(older.get((pair.output, pair.input), none), name)) is not None
+        if (was := getattr(before.parameters, name)) is not None
         and (now := getattr(pair.parameters, name)) is not None
     ]
     if not both:
@@ -101,6 +108,47 @@ def compare(new: Identification, old: Identification) -> tuple[Change, ...]:
         )
         for output, source, name, was, now in both
     )
+
+
+def _converted(
+    was: Estimate, name: str, pair: PairIdentification, before: PairIdentification
+) -> Estimate:
+    """An old figure in the unit of the new one, where both results state a unit."""
+    now: Estimate = getattr(pair.parameters, name)
+    own, unit = was.unit, now.unit
+    if name == "scale_factor":
+        own, unit = _units_of_gains(was, now, before, pair)
+    elif not (own and unit):
+        return was
+    if own == unit:
+        return was
+    try:
+        factor = conversion_factor(own, to=unit)
+    except UnitError:
+        raise RecordError(
+            f"the {in_words(name)} of {pair.output!r} from {pair.input!r} is in "
+            f"{now.unit or '1'!r}, and in {was.unit or '1'!r} in the older result, which cannot "
+            "be converted; compare results in like units"
+        ) from None
+    low, high = (None if end is None else factor * end for end in was.ci95 or (None, None))
+    std = None if was.std is None else factor * was.std
+    return Estimate(
+        value=factor * was.value, std=std, ci95=(low, high), unit=now.unit, verdict=was.verdict
+    )
+
+
+def _units_of_gains(
+    was: Estimate, now: Estimate, before: PairIdentification, pair: PairIdentification
+) -> tuple[str, str]:
+    """Units between which an old scale factor is converted; alike where an output has none."""
+    old, new = before.parameters.bias, pair.parameters.bias
+    if old is None or new is None or not (old.unit and new.unit):
+        return "", ""
+    unstated = was.unit == gain_unit(before, ("", old.unit))
+    unstated = unstated or now.unit == gain_unit(pair, ("", new.unit))
+    if unstated and like_gains(before, pair):
+        return old.unit, new.unit  # an input without a unit is taken to be in that of the other
+    return was.unit, now.unit
 
 
 def _deviations(now: Estimate, was: Estimate) -> float:

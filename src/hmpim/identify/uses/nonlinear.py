@@ -10,7 +10,8 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.result import PairIdentification
 from hmpim.identify.worth import FEW
 from hmpim.model import Model, simulate
-from hmpim.model.nonlinear import KIND_WORDS, excursion
+from hmpim.model.model import simulate_with_reach
+from hmpim.model.nonlinear import KIND_WORDS, NonlinearPart
 from hmpim.model.operators import gap_crossed
 from hmpim.record import Aligned, Finding
 
@@ -35,29 +36,39 @@ def left_out(pair: PairIdentification) -> str | None:
 
 def applied(
     pair: PairIdentification, model: Model, u: Real, fs: float
-) -> tuple[Model, tuple[Finding, ...]]:
+) -> tuple[Model, Real, tuple[Finding, ...]]:
     """The model as it can be driven by an input, (n,) at `fs` in Hz, and what to know about it.
 
-    Its nonlinear part is taken off where it cannot be applied.
+    Its nonlinear part is taken off where it cannot be applied. The second value is the output that
+    it simulates, (n,), without saturation, hold and rounding.
     """
     lacking = left_out(pair)
+    found: tuple[Finding, ...] = ()
     if lacking is not None:
-        return model, (_linear_only(pair, f"{lacking} was found, but is not part of the model"),)
-    part = model.nonlinear
-    if part is None:
-        return model, ()
-    try:
-        farthest = excursion(part, model.system, u, fs, model.intersample)
-    except ArgumentError as reason:
-        return replace(model, nonlinear=None), (_linear_only(pair, str(reason)),)
+        found = (_linear_only(pair, f"{lacking} was found, but is not part of the model"),)
+    elif (part := model.nonlinear) is not None:
+        try:
+            moved, reach = simulate_with_reach(model, u, fs=fs)
+        except ArgumentError as reason:
+            model = replace(model, nonlinear=None)
+            found = (_linear_only(pair, str(reason)),)
+        else:
+            return model, moved, _beyond(pair, model, part, reach)
+    return model, simulate(model, u, fs=fs, intersample=model.intersample), found
+
+
+def _beyond(
+    pair: PairIdentification, model: Model, part: NonlinearPart, farthest: float
+) -> tuple[Finding, ...]:
+    """Report an input that goes beyond the amplitude at which the nonlinearity was identified."""
     if farthest <= (1.0 + FEW) * part.reach:
-        return model, ()
+        return ()
     what, unit = "moves the output by", model.output_unit
     if part.at == "command":
         speed = part.kind == "rate_limit"
         unit = "per s" if speed else ""
         what = "moves at" if speed else "goes"
-    return model, (
+    return (
         Finding(
             code="beyond_reach",
             message=f"{pair.input!r} {what} up to {f'{farthest:.4g} {unit}'.rstrip()}, and "
@@ -71,20 +82,23 @@ def applied(
 
 def all_applied(
     pairs: Sequence[PairIdentification], models: Sequence[Model], aligned: Aligned
-) -> tuple[list[Model], Mask, tuple[Finding, ...]]:
-    """The models of an output as a record can drive them, the samples, (n,), and the findings.
+) -> tuple[list[Model], list[Real], Mask, tuple[Finding, ...]]:
+    """The models of an output as a record can drive them, their outputs, samples and findings.
 
-    The samples are those at which all inputs and the states of the nonlinear parts are known.
+    The outputs and the samples are (n,). The samples are those at which all inputs and the states
+    of the nonlinear parts are known.
     """
     driven: list[Model] = []
+    outputs: list[Real] = []
     known, said = np.ones(aligned.samples, dtype=bool), list[Finding]()
     for pair, model in zip(pairs, models, strict=True):
         source = aligned.signal(pair.input)
-        able, findings = applied(pair, model, source.values, aligned.fs)
+        able, moved, findings = applied(pair, model, source.values, aligned.fs)
         driven.append(able)
+        outputs.append(moved)
         said += findings
         known &= source.valid & known_state(able, source.values, aligned.fs)
-    return driven, known, tuple(said)
+    return driven, outputs, known, tuple(said)
 
 
 def known_state(model: Model, u: Real, fs: float) -> Mask:

@@ -12,7 +12,7 @@ from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.result import Estimate, PairIdentification, fit_percent
 from hmpim.identify.result.groups import in_words
 from hmpim.identify.uses.nonlinear import applied, known_state
-from hmpim.model import Model, Spread, simulate, slowest_time_constant
+from hmpim.model import Model, Spread, slowest_time_constant
 from hmpim.record import Finding, Record, uniform
 
 __all__ = [
@@ -177,9 +177,8 @@ def predict(pair: PairIdentification, record: Record, *, start: float | None = N
     """
     aligned = uniform(record)
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
-    model, findings = applied(pair, to_model(pair, fs=aligned.fs), u.values, aligned.fs)
-    predicted = simulate(model, u.values, fs=aligned.fs, intersample=pair.intersample)
-    predicted = model.within(predicted)
+    model, moved, findings = applied(pair, to_model(pair, fs=aligned.fs), u.values, aligned.fs)
+    predicted = model.within(moved)
     if start is None:
         start = aligned.start + settling_time(model)
     scored = y.valid & (aligned.time >= start) & known_state(model, u.values, aligned.fs)

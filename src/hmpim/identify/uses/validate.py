@@ -1,5 +1,6 @@
 """Validation of a result on another record: fit, residual, and the band of the prediction."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,16 +14,15 @@ from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, ljung_box
-from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Identification, PairIdentification
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
+from hmpim.identify.uses.gains import check_units
 from hmpim.identify.uses.nonlinear import all_applied
 from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
-from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Aligned, Finding, Record, uniform
 
 __all__ = ["Bounds", "Check", "OutputValidation", "Validation", "validate"]
@@ -67,6 +67,9 @@ class Bounds:
     chance: float | None = FALSE_ALARM
 
     def __post_init__(self) -> None:
+        for name, value in (("fit_percent", self.fit_percent), ("noise_ratio", self.noise_ratio)):
+            if value is not None and math.isinf(value):
+                raise ArgumentError(f"{name} = {value!r} is no bound; give a finite number")
         if self.fit_percent is not None and not self.fit_percent < 100:
             raise ArgumentError(f"fit_percent = {self.fit_percent!r} cannot be met; stay below 100")
         if self.noise_ratio is not None and not self.noise_ratio > 1.0:
@@ -256,34 +259,11 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
             "the result has no model to validate: no pair has all figures that a model needs"
         )
     for pair in filter(has_model, result.pairs):
-        _check_units(pair, aligned)
+        check_units(pair, aligned)
     limits, fs = bounds or Bounds(), result.record.fs
     return Validation(
         outputs=tuple(_validated(aligned, pairs, limits, fs=fs) for pairs in by_output.values())
     )
-
-
-def _check_units(pair: PairIdentification, aligned: Aligned) -> None:
-    """Refuse a record in other units than the result's, where both state them."""
-    u, y = aligned.signal(pair.input), aligned.signal(pair.output)
-    known = pair.parameters
-    if known.bias is None or known.scale_factor is None or pair.structure is None:
-        return
-    if not (known.bias.unit and u.unit and y.unit):
-        return
-    named = (known for known in STRUCTURES.values() if known.name == pair.structure)
-    structure = next(named, FILTERS["static"])  # a filter's gain is output over input as well
-    scales = {
-        units_of(structure, (unit, y.unit))["scale_factor"]
-        for unit in (u.unit, "")  # the result may not have the unit of its input
-    }
-    if known.bias.unit != y.unit or known.scale_factor.unit not in scales:
-        raise RecordError(
-            f"{pair.output!r} from {pair.input!r} was identified with an output in "
-            f"{known.bias.unit!r} and a scale factor in {known.scale_factor.unit or '1'!r}; the "
-            f"record has {u.unit!r} and {y.unit!r}, and numbers are not converted: give a record "
-            "in the units of the result"
-        )
 
 
 def _validated(
@@ -291,7 +271,8 @@ def _validated(
 ) -> OutputValidation:
     """Validate one output, driven by all its inputs."""
     y = aligned.signal(pairs[0].output)
-    models, known, findings = all_applied(pairs, [to_model(pair, fs=fs) for pair in pairs], aligned)
+    whole = [to_model(pair, fs=fs) for pair in pairs]
+    models, moved, known, findings = all_applied(pairs, whole, aligned)
     wait = max(settling_time(model) for model in models)
     scored = y.valid & known & (aligned.time >= aligned.start + wait)
     if models[0].hold_period is not None:
@@ -300,9 +281,11 @@ def _validated(
             index = updates(held, y.values.size, aligned.fs).index
             scored &= np.isin(np.arange(y.values.size), index)
             models = [replace(m, hold_period=held.period, hold_phase=held.phase) for m in models]
-    predicted = _predicted(models, pairs, aligned)
+    if any(model.hold_period is not None for model in models):
+        moved = [_moved(m, p, aligned) for m, p in zip(models, pairs, strict=True)]
+    predicted = _summed(models, moved)
     noise = models[0].noise_std
-    model_std = _model_std(models, pairs, aligned)
+    model_std = _model_std(models, moved, pairs, aligned)
     for level, side in ((models[0].saturation_low, -1.0), (models[0].saturation_high, 1.0)):
         if level is not None:  # near a level, noise determines which samples are clipped
             scored &= side * (level - predicted) > DEVIATIONS * noise
@@ -345,24 +328,35 @@ def _validated(
 def _predicted(
     models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
 ) -> Real:
-    """Sum over the inputs, bias once; a held output is updated by its own clock."""
-    total = np.full(aligned.samples, models[0].bias)
-    clock = aligned.time - aligned.start
-    for model, pair in zip(models, pairs, strict=True):
-        u = aligned.signal(pair.input).values
-        free = replace(model, saturation_low=None, saturation_high=None, quantization_step=None)
-        if model.hold_period is None:
-            moved = simulate(free, u, fs=aligned.fs, intersample=model.intersample)
-        else:
-            moved = free.simulate(u, clock)
-        total += moved - model.bias
+    """Output of all models together, (n,)."""
+    moved = [_moved(model, pair, aligned) for model, pair in zip(models, pairs, strict=True)]
+    return _summed(models, moved)
+
+
+def _moved(model: Model, pair: PairIdentification, aligned: Aligned) -> Real:
+    """Output of one model, (n,); a held output is updated by its own clock."""
+    u = aligned.signal(pair.input).values
+    free = replace(model, saturation_low=None, saturation_high=None, quantization_step=None)
+    if model.hold_period is None:
+        return simulate(free, u, fs=aligned.fs, intersample=model.intersample)
+    return free.simulate(u, aligned.time - aligned.start)
+
+
+def _summed(models: Sequence[Model], moved: Sequence[Real]) -> Real:
+    """Sum over the inputs, (n,), bias once."""
+    total = np.full(moved[0].size, models[0].bias)
+    for model, output in zip(models, moved, strict=True):
+        total += output - model.bias
     return total
 
 
 def _model_std(
-    models: Sequence[Model], pairs: Sequence[PairIdentification], aligned: Aligned
+    models: Sequence[Model],
+    moved: Sequence[Real],
+    pairs: Sequence[PairIdentification],
+    aligned: Aligned,
 ) -> Real:
-    """Standard deviation of the prediction, by the uncertainty of the models."""
+    """Standard deviation of the prediction, `moved` of each model, by their uncertainty."""
     if any(model.spread is None for model in models):
         return np.zeros(aligned.samples)
     # A force is followed step by step: its own error is added to that of the linear part.
@@ -374,10 +368,10 @@ def _model_std(
     drawn = [draw_models(model, _DRAWS, rng=0) for model in free]
     predictions = [_predicted(some, pairs, aligned) for some in zip(*drawn, strict=True)]
     std = np.asarray(np.std(predictions, axis=0))
-    for model, one, pair in zip(models, free, pairs, strict=True):
+    for model, own, one, pair in zip(models, moved, free, pairs, strict=True):
         part = model.nonlinear
         if part is not None and one.nonlinear is None:
-            effect = _predicted([model], [pair], aligned) - _predicted([one], [pair], aligned)
+            effect = _summed([model], [own]) - _predicted([one], [pair], aligned)
             std = np.hypot(std, np.abs(effect) * part.std / part.size)
     return std
 

@@ -239,7 +239,7 @@ class MotionTable(Simulated):
         >>> MotionTable().timing(500.0).hold
         4
         """
-        hold = round(self.controller_rate / fs) if fs > 0.0 else 0
+        hold = round(self.controller_rate / fs) if fs > 1e-9 * self.controller_rate else 0
         if hold < 1 or abs(hold * fs / self.controller_rate - 1.0) > 1e-9:
             raise ArgumentError(
                 f"fs = {fs:g} Hz does not divide the controller's rate "

@@ -110,7 +110,7 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="ArduPilot", groups=tuple(groups), findings=said)
 
 
-ARDUPILOT = Reader(format="ArduPilot", sniff=sniff, channels=channels, read=read)
+ARDUPILOT = Reader(format="ArduPilot", sniff=sniff, channels=channels, read=read, uses=())
 
 
 def _scan(data: bytes) -> list[_Form]:

@@ -74,7 +74,13 @@ def parse(path: Path, layout: Layout) -> Log:
 
 
 BLACKBOX = Reader(
-    format="blackbox", sniff=sniff, channels=channels, read=read, extra="betaflight", foreign=True
+    format="blackbox",
+    sniff=sniff,
+    channels=channels,
+    read=read,
+    extra="betaflight",
+    foreign=True,
+    uses=("sheet",),
 )
 
 

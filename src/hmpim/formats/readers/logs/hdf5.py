@@ -77,7 +77,7 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="HDF5", groups=groups_of(groups, separator="/", outermost="/"), findings=said)
 
 
-HDF5 = Reader(format="HDF5", sniff=sniff, channels=channels, read=read, foreign=True)
+HDF5 = Reader(format="HDF5", sniff=sniff, channels=channels, read=read, foreign=True, uses=())
 
 
 def _datasets(file: Any) -> list[tuple[str, Any]]:

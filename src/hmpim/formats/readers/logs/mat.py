@@ -64,7 +64,9 @@ def parse(path: Path, layout: Layout) -> Log:
     )
 
 
-MAT = Reader(format="MATLAB", sniff=sniff, channels=channels, read=read, extra="mat", foreign=True)
+MAT = Reader(
+    format="MATLAB", sniff=sniff, channels=channels, read=read, extra="mat", foreign=True, uses=()
+)
 
 
 def _values(values: Any) -> Any:

@@ -68,7 +68,9 @@ def parse(path: Path, layout: Layout) -> Log:
     )
 
 
-MDF = Reader(format="MDF", sniff=sniff, channels=channels, read=read, extra="mdf", foreign=True)
+MDF = Reader(
+    format="MDF", sniff=sniff, channels=channels, read=read, extra="mdf", foreign=True, uses=()
+)
 
 
 def _group(file: Any, place: int, names: dict[str, int]) -> Group:

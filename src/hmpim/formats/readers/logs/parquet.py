@@ -70,7 +70,13 @@ def parse(path: Path, layout: Layout) -> Log:
 
 
 PARQUET = Reader(
-    format="Parquet", sniff=sniff, channels=channels, read=read, extra="parquet", foreign=True
+    format="Parquet",
+    sniff=sniff,
+    channels=channels,
+    read=read,
+    extra="parquet",
+    foreign=True,
+    uses=(),
 )
 
 

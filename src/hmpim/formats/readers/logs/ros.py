@@ -77,7 +77,15 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format=name, groups=tuple(groups), origin=base / 1e9)
 
 
-ROS = Reader(format="ROS bag", sniff=sniff, channels=channels, read=read, extra="ros", foreign=True)
+ROS = Reader(
+    format="ROS bag",
+    sniff=sniff,
+    channels=channels,
+    read=read,
+    extra="ros",
+    foreign=True,
+    uses=("stamps",),
+)
 
 
 def _head(path: Path) -> bytes:

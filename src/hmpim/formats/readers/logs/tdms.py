@@ -66,7 +66,9 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="TDMS", groups=found, findings=said)
 
 
-TDMS = Reader(format="TDMS", sniff=sniff, channels=channels, read=read, extra="tdms", foreign=True)
+TDMS = Reader(
+    format="TDMS", sniff=sniff, channels=channels, read=read, extra="tdms", foreign=True, uses=()
+)
 
 
 def _lost(status: Any) -> str:

@@ -59,7 +59,9 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="UFF58", groups=tuple(_group(members) for members in groups.values()))
 
 
-UFF58 = Reader(format="UFF58", sniff=sniff, channels=channels, read=read, extra="uff", foreign=True)
+UFF58 = Reader(
+    format="UFF58", sniff=sniff, channels=channels, read=read, extra="uff", foreign=True, uses=()
+)
 
 
 def _names(responses: Sequence[Any]) -> list[str]:

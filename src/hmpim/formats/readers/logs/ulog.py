@@ -57,7 +57,15 @@ def parse(path: Path, layout: Layout) -> Log:
     )
 
 
-ULOG = Reader(format="ULog", sniff=sniff, channels=channels, read=read, extra="ulog", foreign=True)
+ULOG = Reader(
+    format="ULog",
+    sniff=sniff,
+    channels=channels,
+    read=read,
+    extra="ulog",
+    foreign=True,
+    uses=("stamps",),
+)
 
 
 def _group(dataset: Any, start: int, stamps: Stamps) -> Group:

@@ -73,7 +73,7 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="WAV", groups=(group,), fs=float(rate), findings=tuple(said))
 
 
-WAV = Reader(format="WAV", sniff=sniff, channels=channels, read=read, foreign=True)
+WAV = Reader(format="WAV", sniff=sniff, channels=channels, read=read, foreign=True, uses=())
 
 
 def _frame(data: bytes) -> tuple[int, int, int]:

@@ -95,7 +95,7 @@ def parse(path: Path, layout: Layout) -> Log:
     return Log(format="WPILOG", groups=tuple(_groups(every)), findings=said)
 
 
-WPILOG = Reader(format="WPILOG", sniff=sniff, channels=channels, read=read)
+WPILOG = Reader(format="WPILOG", sniff=sniff, channels=channels, read=read, uses=())
 
 
 def _record(data: bytes, place: int) -> tuple[int, int, int, int] | None:

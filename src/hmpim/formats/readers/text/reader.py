@@ -62,7 +62,7 @@ def read(path: Path, names: Sequence[str], layout: Layout) -> tuple[Series, ...]
     return read_table(open_source(path), names, layout)
 
 
-TEXT = Reader(format="text", sniff=sniff, channels=channels, read=read)
+TEXT = Reader(format="text", sniff=sniff, channels=channels, read=read, uses=())
 
 
 def list_table(lines: Lines, layout: Layout, *, form: str) -> Contents:
