@@ -304,13 +304,17 @@ def realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, flo
     modal = modal_form(b, a)
     if modal is not None:
         return modal
-    most = float(np.abs(b).max()) or 1.0  # of any unit
-    A, B, C, D = scipy.signal.tf2ss(b[::-1] / most, a[::-1])
-    D = D * most
-    balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    entry, output = B[:, 0] / scale, C[0] * most * scale
+    n, most = a.size - 1, float(np.abs(b).max()) or 1.0  # of any unit
+    below = a[::-1] / a[-1]
+    above = np.pad(b, (0, n + 1 - b.size))[::-1] / most / a[-1]
+    companion = np.eye(n, k=-1)
+    companion[0] = -below[1:]
+    balanced, (scale, _) = scipy.linalg.matrix_balance(companion, permute=False, separate=True)
+    entry = np.eye(n)[0] / scale
+    output = (above[1:] - above[0] * below[1:]) * most * scale
     size = np.abs(entry).max()  # the state counts in units of what comes in
-    return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), float(D[0, 0])
+    through = float(above[0] * most)
+    return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), through
 
 
 def _advance(generator: _Real, entry: _Real, span: float) -> tuple[_Real, _Real, _Real]:
