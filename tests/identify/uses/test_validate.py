@@ -242,3 +242,14 @@ def test_results_of_different_units_are_not_compared(result):
     other = hmpim.identify(hmpim.run(replace(SENSOR, output_name="z"), SWEEP, rng=2))
     with pytest.raises(RecordError, match="no parameter in common"):
         compare(other, result)
+
+
+def test_a_delay_that_its_record_left_open_is_validated(result):
+    """Draws of it ran ahead by more samples than there is memory for."""
+    pair = result.pairs[0]
+    left_open = pair.covariance.copy()
+    left_open[0, :] = left_open[:, 0] = 0.0
+    left_open[0, 0] = 1e28
+    unsure = replace(result, pairs=(replace(pair, covariance=left_open),))
+    (output,) = hmpim.validate(unsure, hmpim.run(SENSOR, SWEEP, rng=2)).outputs
+    assert np.isfinite(output.std).all()
