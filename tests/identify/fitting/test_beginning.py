@@ -100,3 +100,15 @@ def test_sines_that_go_on_are_no_response_from_rest():
     pair = hmpim.identify(cut(u, second_order(5.6, 0.63, 0.001, 2.1), 400, 0.03, seed))["y", "u"]
     assert pair.structure == "second_order"
     assert pair.bias.value == pytest.approx(2.1, abs=0.01)
+
+
+def test_measured_input_that_explains_its_output_exactly_is_all_that_counts():
+    """Its residual is 0, and no division by its power may follow."""
+    u = np.random.default_rng(0).choice([-1.0, 1.0], 300)
+    y = np.concatenate([[0.0, 0.0], 2.0 * u[:-2]])
+    lost = np.zeros(300, dtype=bool)
+    lost[100:160] = True
+    record = hmpim.Record.from_arrays(
+        {"u": np.ma.masked_array(u, lost)}, {"y": y}, fs=FS, intersample="zoh"
+    )
+    assert hmpim.identify(record)["y", "u"].fit_percent == pytest.approx(100.0)

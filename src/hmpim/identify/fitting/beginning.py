@@ -84,17 +84,17 @@ def _of_measured(fit: Fit, counted: Mask, known: Mask) -> Mask:
     unknown, index = np.concatenate([[0], np.cumsum(~known)]), np.arange(known.size)
     while True:
         clear = counted & (unknown[index + 1] == unknown[np.maximum(index - reach, 0)])
-        few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
-        if few or _precision(residual[clear]) <= _precision(residual[counted]):
+        few = np.count_nonzero(clear) <= FEW * np.count_nonzero(counted)
+        if few or _variance(residual[clear]) >= _variance(residual[counted]):
             return counted
         if not _stands_out(residual, counted & ~clear, clear):
             return counted
         counted, reach = clear, 2 * reach
 
 
-def _precision(residual: Real) -> float:
-    """Samples over their mean square: the variance of an estimate is inversely proportional."""
-    return residual.size**2 / max(float(np.sum(residual**2)), np.finfo(float).tiny)
+def _variance(residual: Real) -> float:
+    """Mean square over the number of samples: the variance of an estimate is proportional to it."""
+    return float(np.sum(residual**2)) / residual.size**2
 
 
 def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
