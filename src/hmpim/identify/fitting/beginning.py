@@ -223,12 +223,16 @@ def ringing(count: int, delay: Real | float, reach: int) -> Mask:
 def begin_later(seen: Counted, fit: Fit) -> Counted | None:
     """Samples that count if a fit has a longer delay than earlier ones; None if none drops out.
 
-    Samples before the delay answer input before the record, which no free response describes.
+    Samples before the delay answer input before the record, which no free response describes. None
+    as well if too few would be left for the fit.
     """
     begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
     if seen.begins is None or begins <= seen.begins:
         return None
-    return begin_at(seen, begins, size)
+    later = begin_at(seen, begins, size)
+    if later is None or np.count_nonzero(later.valid) < _LEFT * fit.structure.parameters:
+        return None
+    return later
 
 
 def begin_at(seen: Counted, begins: int, size: int) -> Counted | None:
