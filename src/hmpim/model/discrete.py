@@ -243,13 +243,16 @@ def _filter(system: RationalDelay, fs: float) -> Discrete:
     above, below = in_z(system.numerator) / below[0], below / below[0]
     n = int(np.flatnonzero(np.abs(below) > _NOUGHT * np.abs(below).max())[-1])
     below = below[: n + 1]
+    if 0 < n < above.size - 1:  # poles at z = 0 were cut off; the state holds what B takes of them
+        n = above.size
+        below = np.concatenate([below, np.zeros(n + 1 - below.size)])
     taps, direct = np.ones(1), 0.0
     output = np.zeros(n)
     if n == 0:
         taps, direct = above, 1.0
     else:  # B = direct A + Σ output[i] z^-i, so that the state holds what it takes
         above = np.concatenate([above, np.zeros(max(n + 1 - above.size, 0))])
-        direct = float(above[n] / below[n])
+        direct = float(above[n] / below[n]) if below[n] else 0.0
         output = (above - direct * below)[:n]
     transition = np.eye(n, k=-1)
     transition[:1] = -below[1:]
