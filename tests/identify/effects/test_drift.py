@@ -188,7 +188,7 @@ def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
 
 
 def test_a_drift_and_hum_of_an_output_whose_leading_input_is_unrelated():
-    """That input was left out of the fit with the drift's rows, which were then looked for in it."""
+    """That input was left out of the fit with the rows of the drift, and had none of them."""
     draw, k = np.random.default_rng(5), np.arange(400)
     lines, phases = 10 ** draw.uniform(-3, np.log10(0.45), 11), draw.uniform(0, 6, 11)
     ramp = np.clip((k - 45) / 160, 0.0, 1.0)

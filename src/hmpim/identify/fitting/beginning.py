@@ -230,9 +230,10 @@ def begin_later(seen: Counted, fit: Fit) -> Counted | None:
     if seen.begins is None or begins <= seen.begins:
         return None
     later = begin_at(seen, begins, size)
-    if later is None or np.count_nonzero(later.valid) < _LEFT * fit.structure.parameters:
-        return None
-    return later
+    if later is None or later.valid is None:
+        return later
+    enough = np.count_nonzero(later.valid) >= _LEFT * fit.structure.parameters
+    return later if enough else None
 
 
 def begin_at(seen: Counted, begins: int, size: int) -> Counted | None:
