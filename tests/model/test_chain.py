@@ -196,6 +196,19 @@ def test_what_cannot_be_simulated_is_refused(u, t, said):
         STATIC.simulate(u, t)
 
 
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda model: model.simulate(np.ones(600), T),
+        lambda model: simulate(model, np.ones(600), fs=FS, intersample="zoh"),
+    ],
+)
+def test_a_model_ahead_of_its_whole_input_is_refused(run):
+    """It asked for as much memory as it is early."""
+    with pytest.raises(ArgumentError, match="runs ahead of the input, which is 3 s long"):
+        run(replace(STATIC, delay=-1e14))
+
+
 def test_readouts_that_cannot_be_are_refused():
     with pytest.raises(ArgumentError, match=r"saturation_low = 2.0 is not below"):
         replace(STATIC, saturation_low=2.0, saturation_high=1.0)

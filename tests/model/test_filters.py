@@ -93,3 +93,19 @@ def test_software_runs_at_its_own_rate_alone():
     model = hmpim.Model(delay=0.01, scale_factor=1.0, intersample="sampled", fs=200.0)
     with pytest.raises(ArgumentError, match="100 Hz is not the rate of this software, 200 Hz"):
         model.at_rate(100.0)
+
+
+def test_a_filter_with_more_taps_than_poles_off_zero_is_run_as_it_is():
+    """A pole at z = 0 to within rounding is cut off, and with it the state that held a tap."""
+    above, below = np.array([0.2, 0.3, -0.1, 0.05]), np.array([1.0, -1.5, 0.6, -1e-22])
+    model = hmpim.Model(
+        delay=0.0,
+        scale_factor=above.sum() / below.sum(),
+        numerator=tuple(above * below.sum() / above.sum()),
+        denominator=tuple(below),
+        intersample="sampled",
+        fs=200.0,
+    )
+    u = np.concatenate([np.zeros(5), np.random.default_rng(0).standard_normal(200)])
+    found = hmpim.simulate(model, u, fs=200.0, intersample="sampled")
+    np.testing.assert_allclose(found, signal.lfilter(above, below, u), atol=1e-9)

@@ -159,8 +159,9 @@ class _WithRows:
             self.humming = with_hum(joint, self.with_rows)
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
-        # Only inputs that the output is known to follow are used to test for a drift.
-        unrelated = {i: fit for i, fit in enumerate(steady.fits) if not fit.related}
+        # Only inputs that the output is known to follow are used to test for a drift in that asked.
+        others = ((i, fit) for i, fit in enumerate(steady.fits) if i != self.asked)
+        unrelated = {i: fit for i, fit in others if not fit.related}
         self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
         joint, drifting = with_drift(before, self.with_rows, self.steadily)
         if self.unrelated and drifting is not None:

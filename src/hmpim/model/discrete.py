@@ -243,13 +243,16 @@ def _filter(system: RationalDelay, fs: float) -> Discrete:
     above, below = in_z(system.numerator) / below[0], below / below[0]
     n = int(np.flatnonzero(np.abs(below) > _NOUGHT * np.abs(below).max())[-1])
     below = below[: n + 1]
+    if 0 < n < above.size - 1:  # poles at z = 0 were cut off; the state holds what B takes of them
+        n = above.size
+        below = np.concatenate([below, np.zeros(n + 1 - below.size)])
     taps, direct = np.ones(1), 0.0
     output = np.zeros(n)
     if n == 0:
         taps, direct = above, 1.0
     else:  # B = direct A + Σ output[i] z^-i, so that the state holds what it takes
         above = np.concatenate([above, np.zeros(max(n + 1 - above.size, 0))])
-        direct = float(above[n] / below[n])
+        direct = float(above[n] / below[n]) if below[n] else 0.0
         output = (above - direct * below)[:n]
     transition = np.eye(n, k=-1)
     transition[:1] = -below[1:]
@@ -304,13 +307,17 @@ def realised(system: RationalDelay, fs: float) -> tuple[_Real, _Real, _Real, flo
     modal = modal_form(b, a)
     if modal is not None:
         return modal
-    most = float(np.abs(b).max()) or 1.0  # of any unit
-    A, B, C, D = scipy.signal.tf2ss(b[::-1] / most, a[::-1])
-    D = D * most
-    balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    entry, output = B[:, 0] / scale, C[0] * most * scale
+    n, most = a.size - 1, float(np.abs(b).max()) or 1.0  # of any unit
+    below = a[::-1] / a[-1]
+    above = np.pad(b, (0, n + 1 - b.size))[::-1] / most / a[-1]
+    companion = np.eye(n, k=-1)
+    companion[0] = -below[1:]
+    balanced, (scale, _) = scipy.linalg.matrix_balance(companion, permute=False, separate=True)
+    entry = np.eye(n)[0] / scale
+    output = (above[1:] - above[0] * below[1:]) * most * scale
     size = np.abs(entry).max()  # the state counts in units of what comes in
-    return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), float(D[0, 0])
+    through = float(above[0] * most)
+    return np.asarray(balanced), np.asarray(entry / size), np.asarray(output * size), through
 
 
 def _advance(generator: _Real, entry: _Real, span: float) -> tuple[_Real, _Real, _Real]:

@@ -239,6 +239,7 @@ class Model:
         [0.0, 0.0, 0.0, 1.0]
         """
         values, fs, start = _evenly(u, t)
+        _check_ahead(self, fs, values.size)
         model = replace(self, hold_phase=self.hold_phase - start)
         lead = max(ceil(-self.delay * fs - 1e-9), 0)
         if lead:  # a model that is ahead of its input sees the input go on as it ended
@@ -249,6 +250,15 @@ class Model:
         chain = model.at_rate(fs, intersample=intersample)
         noise = None if rng is None else generator(rng)
         return run_chain(chain, values, rng=noise)[lead:]
+
+
+def _check_ahead(model: Model, fs: float, samples: int) -> None:
+    """Raise ArgumentError if a model runs ahead of its input by more than the whole of it."""
+    if -model.delay * fs > samples:
+        raise ArgumentError(
+            f"delay = {model.delay:g} s runs ahead of the input, which is {samples / fs:g} s long; "
+            "give a longer input, or a smaller lead"
+        )
 
 
 def _known(intersample: str) -> Intersample:
@@ -381,6 +391,7 @@ def simulate(
     samples = np.atleast_1d(numbers_of("u", u))
     if samples.size < 2:
         raise ArgumentError(f"u has {samples.size} samples; give two or more")
+    _check_ahead(model, fs, samples.size)
     part = model.nonlinear
     if part is not None and intersample != model.intersample:
         part = replace(part, between=intersample)

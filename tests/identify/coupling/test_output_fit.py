@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import RecordError
@@ -180,3 +181,13 @@ def test_a_late_answer_leaves_fewer_bins_between_two_bands():
     result = hmpim.identify(hmpim.Record.from_arrays(inputs, {"y": y}, fs=fs))
     assert result["y", "a"].delay.value == pytest.approx(1.5, abs=1e-4)
     assert result["y", "b"].delay.value == pytest.approx(0.0, abs=1e-4)
+
+
+def test_a_weak_coupling_of_software_shares_its_phase_with_no_lag():
+    """A lag between samples has no meaning there, and its response is not known."""
+    rng = np.random.default_rng(6)
+    u, v = rng.standard_normal((2, 400))
+    y = lfilter([0.2], [1.0, -0.8], u) + 0.005 * v + 0.01 * rng.standard_normal(400)
+    record = hmpim.Record.from_arrays({"u": u, "v": v}, {"y": y}, fs=FS)
+    pair = hmpim.identify(record, intersample="sampled")["y", "v"]
+    assert abs(pair.scale_factor.value - 0.005) < 3 * pair.scale_factor.std

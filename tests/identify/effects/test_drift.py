@@ -185,3 +185,17 @@ def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
     )
     assert (found is not None, joint is first) == (drifts, not drifts)
     assert ((found.rival if found else None) is first.best.fit) == rival
+
+
+def test_a_drift_and_hum_of_an_output_whose_leading_input_is_unrelated():
+    """That input was left out of the fit with the rows of the drift, and had none of them."""
+    draw, k = np.random.default_rng(5), np.arange(400)
+    lines, phases = 10 ** draw.uniform(-3, np.log10(0.45), 11), draw.uniform(0, 6, 11)
+    ramp = np.clip((k - 45) / 160, 0.0, 1.0)
+    tones = np.sin(2 * np.pi * lines[:, None] * k + phases[:, None]).sum(axis=0)
+    noise = 0.006 * np.random.default_rng(3).standard_normal(k.size)
+    y = 0.057 * np.cumsum(ramp) + 0.04 * np.gradient(tones) + noise
+    record = hmpim.Record.from_arrays({"u": ramp, "v": tones}, {"y": y}, fs=100.0)
+    result = hmpim.identify(record, structures=["second_order"])
+    assert len(result) == 2
+    assert result.verdict != "ok"

@@ -5,7 +5,8 @@ import pytest
 from scipy.signal import lfilter, lsim
 
 import hmpim
-from hmpim.identify.fitting.beginning import begins_of
+from hmpim.identify.fitting.beginning import begin_later, begins_of
+from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import prepare_input
@@ -100,3 +101,25 @@ def test_sines_that_go_on_are_no_response_from_rest():
     pair = hmpim.identify(cut(u, second_order(5.6, 0.63, 0.001, 2.1), 400, 0.03, seed))["y", "u"]
     assert pair.structure == "second_order"
     assert pair.bias.value == pytest.approx(2.1, abs=0.01)
+
+
+def test_measured_input_that_explains_its_output_exactly_is_all_that_counts():
+    """Its residual is 0, and no division by its power may follow."""
+    u = np.random.default_rng(0).choice([-1.0, 1.0], 300)
+    y = np.concatenate([[0.0, 0.0], 2.0 * u[:-2]])
+    lost = np.zeros(300, dtype=bool)
+    lost[100:160] = True
+    record = hmpim.Record.from_arrays(
+        {"u": np.ma.masked_array(u, lost)}, {"y": y}, fs=FS, intersample="zoh"
+    )
+    assert hmpim.identify(record)["y", "u"].fit_percent == pytest.approx(100.0)
+
+
+def test_a_longer_delay_leaves_samples_for_the_fit():
+    """None were left, and the criterion divided by their number."""
+    u = np.random.default_rng(0).standard_normal(400)
+    problem = Problem(source=prepare_input(u, "foh"), y=u, valid=None, longest_delay=300.0)
+    fit = fit_structure(problem, STRUCTURES["static"], np.array([34.4]), iterations=0)
+    early = np.arange(400) < 35  # then the output is stuck
+    assert begin_later(Counted(valid=early, begins=4), fit) is None
+    assert begin_later(Counted(valid=None, begins=4), fit).begins > 34

@@ -12,6 +12,14 @@ from hmpim.identify.fitting.start import rough_response
 from hmpim.model.sampled import prepare_input
 
 
+def test_a_lag_at_which_the_output_stands_still_is_none():
+    u = np.sin(0.01 * np.arange(1000) ** 1.2)
+    y = np.minimum(np.arange(1000), 400.0)
+    rough = rough_response(u, y, longest_delay=850, lag=500)
+    assert rough.lag == 0
+    assert np.abs(rough.response).max() > 0.0
+
+
 def test_a_start_is_followed_once_where_no_structure_leaves_white_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -30,3 +30,10 @@ def test_added_rows_count_without_what_the_model_explains():
     np.testing.assert_allclose(more + shift.T @ model, rest, atol=1e-12)
     np.testing.assert_allclose(own, rest @ rest.T, rtol=1e-10)
     np.testing.assert_allclose(along, rest @ residual[0], rtol=1e-9)
+
+
+def test_a_row_that_rounding_left_less_than_no_power_explains_nothing():
+    gram = np.array([[1.0, 1e3], [1e3, -1e-12]])
+    power, determined = explained(gram, np.array([2.0, 1e10]), least=1e-9)
+    assert float(power) == pytest.approx(4.0)
+    assert int(determined) == 1

@@ -72,3 +72,8 @@ def test_even_samples_whose_stamps_jitter_are_no_loop():
     codes = [w.code for w in pair.warnings]
     assert "even_samples" in codes
     assert "feedback" not in codes
+
+
+def test_nothing_left_is_no_sign_of_a_loop():
+    u = np.random.default_rng(4).standard_normal(800)
+    assert chances_without_feedback(u, np.zeros((1, u.size))).tolist() == [1.0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from hmpim.identify.noise.covariance import covariance
+from hmpim.identify.noise.covariance import covariance, white_covariance
 
 LEFT = np.random.default_rng(0).standard_normal(50)
 
@@ -52,3 +52,8 @@ def test_a_parameter_that_moves_nothing_has_no_error_beside_noise_that_changes()
     rows, noise = loud(np.random.default_rng(0))
     rows[1] = 0.0
     assert covariance(rows, noise, freedom=1998, white=True)[1, 1] > 1e10
+
+
+def test_products_that_rounding_turned_negative_determine_no_covariance():
+    gram = np.array([[1.0, 0.0], [0.0, -1e-17]])
+    assert white_covariance(gram, 1.0, freedom=100) is None

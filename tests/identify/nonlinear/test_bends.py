@@ -93,3 +93,16 @@ def test_a_kind_that_shows_only_where_no_sample_counts_is_not_accused(last, off)
     fit = fit_structure(data, STRUCTURES["second_order"], TRUTH[:3])
     kinds = bends(SWEEP, data, fit, intersample="bandlimited", fs=FS)
     assert all(one.effect < 0.1 for one in kinds)
+
+
+def test_what_bends_beyond_the_end_of_the_record_is_not_weighed():
+    """The spline alone carries a trace of it back, too small for its weight to be squared."""
+    u = np.where(np.arange(T.size) < 1985, np.sin(0.5 * T), 10.0)
+    noise = np.random.default_rng(0).standard_normal(T.size)
+    data = Problem(
+        source=prepare_input(u, "bandlimited"), y=u + noise, valid=None, longest_delay=999
+    )
+    theta = np.array([430.0, *TRUTH[1:3]])
+    fit = fit_structure(data, STRUCTURES["second_order"], theta, iterations=0)
+    found = bends(u, data, fit, intersample="bandlimited", fs=FS, floor=0.0)
+    assert all(np.isfinite(one.moved).all() for one in found)

@@ -109,3 +109,8 @@ def test_backlash_moves_as_it_does_sample_by_sample(kind):
             now = min(max(now, value - half_gap), value + half_gap)
             expected.append(now)
         assert play(x[kind], half_gap).tolist() == expected
+
+
+@pytest.mark.parametrize("level", [0.0, 3.0])
+def test_an_output_that_stands_still_shows_no_kind(level):
+    assert not list(hypotheses(np.full(50, level), np.array([1.0, 2.0]), FS))

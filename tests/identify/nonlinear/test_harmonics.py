@@ -81,7 +81,9 @@ def test_a_sweep_between_rests_is_a_sweep(rest, step):
     assert np.median(off) < (1e-2 if step else 1e-3)
 
 
-@pytest.mark.parametrize("kind", ["square", "triangle", "binary", "noise", "multisine", "constant"])
+@pytest.mark.parametrize(
+    "kind", ["square", "triangle", "binary", "noise", "multisine", "constant", "staircase"]
+)
 def test_what_is_no_sweep(kind):
     rng = np.random.default_rng(0)
     tones = np.arange(1, 15)[:, None]
@@ -92,6 +94,7 @@ def test_what_is_no_sweep(kind):
         "noise": rng.standard_normal(2000),
         "multisine": np.cos(2 * np.pi * tones * T + rng.uniform(0, 6, (14, 1))).sum(axis=0),
         "constant": np.ones(2000),
+        "staircase": np.repeat([0.0, 1.0, 2.0], [51, 182, 67]),  # stands at its centre
     }[kind]
     assert sweep_phase(u, FS) is None
 

@@ -150,3 +150,9 @@ def test_what_has_no_reference_or_two_inputs_is_refused():
     statistics = hmpim.compress(record, lags=100)
     with pytest.raises(ArgumentError, match="statistics contain no reference"):
         hmpim.identify(statistics, reference="r")
+
+
+def test_a_direction_that_the_loop_leaves_open_narrows_no_error_bar():
+    """Parameters of two modes differ by so many decades that some had no error at all."""
+    pair = hmpim.identify(looped(2), reference="r", structures=["two_modes"])["y", "u"]
+    assert pair.scale_factor.std > 0.01

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import hmpim
+from hmpim.identify.reading.readings import Readings
+from hmpim.identify.result import Parameters
+from hmpim.model import RationalDelay
 
 FS = 100.0
 
@@ -24,3 +27,19 @@ def test_a_moving_average_delays_slow_motion_by_half_its_length(taps):
     assert late.value == pytest.approx(3 / FS)
     assert 0 < slow.spread < 1e-4
     assert abs(slow.value - (3 + (taps - 1) / 2) / FS) < 4 * slow.spread
+
+
+def test_a_variance_is_at_least_its_rounding():
+    """Of a direction that the record leaves open nearly everything cancels."""
+    open_end = 1e20 * np.array([[1.0, -1.0], [-1.0, 1.0 - 1e-15]])
+    readings = Readings(
+        parameters=Parameters(),
+        system=RationalDelay(delay=0.0, numerator=np.ones(1), denominator=np.ones(1)),
+        vector=np.zeros(2),
+        covariance=open_end,
+        white=True,
+        halves=np.zeros((2, 2, 2)),
+        innovations=np.zeros(2),
+        coefficient_covariance=np.zeros((1, 1)),
+    )
+    assert 0.0 < readings.variance(lambda at: float(at.sum())) < 1e6

@@ -71,6 +71,15 @@ def test_an_integrator_behind_many_poles_is_the_sum_of_its_aliases():
         assert value == pytest.approx(each.sum(), rel=1e-9)
 
 
+def test_slow_poles_and_a_zero_at_a_high_rate():
+    """Its numerator, small over the slow poles, was once cut off: 60 times too small at 20 Hz."""
+    below = np.polynomial.polynomial.polyfromroots([-9.0, -10.0, -12.0])
+    system = RationalDelay(delay=0.0, numerator=np.array([1.0, 0.5]), denominator=below / below[0])
+    wanted = np.array([0.1, 1.0, 5.0, 20.0])
+    found = sampled_response(system, wanted, fs=1e6, intersample="zoh")
+    np.testing.assert_allclose(found, response(system, wanted), rtol=1e-4)
+
+
 @pytest.mark.parametrize("name", ["first", "second"])
 def test_gain_and_phase_behind_a_held_input_are_the_systems(name):
     """Aliases left out, the first-order lag was read tens of standard deviations off."""

@@ -279,3 +279,10 @@ def test_intervals_hold_over_many_seeds_and_reach_the_bound():
     assert np.all(inside > 0.92)
     assert np.all(inside < 0.98)
     assert squared == pytest.approx(1.0, abs=0.22)
+
+
+def test_an_output_that_moves_only_where_nothing_counts_is_refused_by_name():
+    u = np.sin(0.05 * np.arange(500))
+    y = np.eye(500)[20]
+    with pytest.raises(HmpimError, match="output 'y' moves only in the first 100 samples"):
+        identify(compress(Record.from_arrays({"u": u}, {"y": y}, fs=FS), lags=100))

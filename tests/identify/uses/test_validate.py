@@ -284,3 +284,14 @@ def test_figures_whose_units_cannot_be_converted_are_not_compared(result):
     found = hmpim.identify(in_units(hmpim.run(SENSOR, SWEEP, rng=61), "deg", "V"))
     with pytest.raises(RecordError, match="scale factor of 'y' from 'u' is in 'V/deg', and in '1'"):
         compare(found, result)
+
+
+def test_a_delay_that_its_record_left_open_is_validated(result):
+    """Draws of it ran ahead by more samples than there is memory for."""
+    pair = result.pairs[0]
+    left_open = pair.covariance.copy()
+    left_open[0, :] = left_open[:, 0] = 0.0
+    left_open[0, 0] = 1e28
+    unsure = replace(result, pairs=(replace(pair, covariance=left_open),))
+    (output,) = hmpim.validate(unsure, hmpim.run(SENSOR, SWEEP, rng=2)).outputs
+    assert np.isfinite(output.std).all()

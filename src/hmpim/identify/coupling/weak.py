@@ -174,7 +174,7 @@ class Lag:
 
 
 def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
-    """Average over lags of a coupling; None if it has two poles, or if no lag is possible.
+    """Average over lags of a coupling; None of two poles, of software, or if no lag is possible.
 
     At low frequencies, where a weak coupling is known best, a delay and a first-order lag have the
     same phase. The likeliest split between them then means little, and its error bars less: a lag
@@ -187,6 +187,8 @@ def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
     """
     fit = pair.best.fit
     if fit.structure.name not in ("static", "first_order"):
+        return None
+    if pair.best.intersample == "sampled":  # software is late by whole samples
         return None
     problem = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
     basis, _ = np.linalg.qr(others.T)

@@ -84,17 +84,17 @@ def _of_measured(fit: Fit, counted: Mask, known: Mask) -> Mask:
     unknown, index = np.concatenate([[0], np.cumsum(~known)]), np.arange(known.size)
     while True:
         clear = counted & (unknown[index + 1] == unknown[np.maximum(index - reach, 0)])
-        few = np.count_nonzero(clear) < FEW * np.count_nonzero(counted)
-        if few or _precision(residual[clear]) <= _precision(residual[counted]):
+        few = np.count_nonzero(clear) <= FEW * np.count_nonzero(counted)
+        if few or _variance(residual[clear]) >= _variance(residual[counted]):
             return counted
         if not _stands_out(residual, counted & ~clear, clear):
             return counted
         counted, reach = clear, 2 * reach
 
 
-def _precision(residual: Real) -> float:
-    """Samples over their mean square: the variance of an estimate is inversely proportional."""
-    return residual.size**2 / max(float(np.sum(residual**2)), np.finfo(float).tiny)
+def _variance(residual: Real) -> float:
+    """Mean square over the number of samples: the variance of an estimate is proportional to it."""
+    return float(np.sum(residual**2)) / residual.size**2
 
 
 def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
@@ -223,12 +223,17 @@ def ringing(count: int, delay: Real | float, reach: int) -> Mask:
 def begin_later(seen: Counted, fit: Fit) -> Counted | None:
     """Samples that count if a fit has a longer delay than earlier ones; None if none drops out.
 
-    Samples before the delay answer input before the record, which no free response describes.
+    Samples before the delay answer input before the record, which no free response describes. None
+    as well if too few would be left for the fit.
     """
     begins, size = int(np.ceil(fit.delay)) + REACH, fit.residual.size
     if seen.begins is None or begins <= seen.begins:
         return None
-    return begin_at(seen, begins, size)
+    later = begin_at(seen, begins, size)
+    if later is None or later.valid is None:
+        return later
+    enough = np.count_nonzero(later.valid) >= _LEFT * fit.structure.parameters
+    return later if enough else None
 
 
 def begin_at(seen: Counted, begins: int, size: int) -> Counted | None:

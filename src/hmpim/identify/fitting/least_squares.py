@@ -96,11 +96,12 @@ def explained(
         Power of each row before the scaling, if it is not on the diagonal of `gram`.
     """
     power = np.diagonal(gram, axis1=-2, axis2=-1) if size is None else size
-    scale = np.sqrt(np.maximum(power, np.finfo(float).tiny))
+    # Rounding may leave a row less power than none: it determines nothing.
+    scale = np.where(power > 0.0, np.sqrt(np.maximum(power, np.finfo(float).tiny)), np.inf)
     values, vectors = np.linalg.eigh(gram / (scale[..., :, None] * scale[..., None, :]))
     determined = values > least * (values[..., -1:] if size is None else 1.0)
     along = (vectors.swapaxes(-1, -2) @ (moment / scale)[..., None])[..., 0]
-    each = np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0)
+    each = np.where(determined, along, 0.0) ** 2 / np.where(determined, values, 1.0)
     return np.sum(each, axis=-1), np.count_nonzero(determined, axis=-1)
 
 

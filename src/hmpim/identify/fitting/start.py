@@ -152,11 +152,12 @@ def rough_response(
     group = max(min(u.size // (_TURNS * (abs(lag) + _LATE)), u.size // _ENOUGH), 1)
     length = scipy.fft.next_fast_len(-(-u.size // group), real=True)
     spectrum_u = _tapered_transform(u[max(-lag, 0) :][:overlap], group * length)
-    spectrum_y = scipy.fft.rfft(_tapered(y[max(lag, 0) :][:overlap]), group * length)
+    answer = y[max(lag, 0) :][:overlap]
+    spectrum_y = scipy.fft.rfft(_tapered(answer), group * length)
     power = _grouped(spectrum_u.real**2 + spectrum_u.imag**2, group)
     cross = _grouped(np.conj(spectrum_u) * spectrum_y, group)
     power[0] = 0.0
-    if lag and not power.any():  # the input stands still in the overlap
+    if lag and not (power.any() and np.ptp(answer)):  # one of them stands still in the overlap
         return rough_response(u, y, longest_delay=longest_delay, lag=0)
     bins = np.flatnonzero(power > _FLOOR**2 * power.max())
     return RoughResponse(

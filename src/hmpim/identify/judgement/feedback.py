@@ -115,8 +115,9 @@ def _by_products(u: Real, residuals: Real, counts: Mask | None) -> Real:
     cross = np.stack([np.correlate(moves, row, "valid") for row in inner], axis=1)
     cross = np.concatenate([inner.sum(axis=1)[None], cross])
     along = direction.T @ (cross[_FUTURE] - predicted.T @ cross[_PAST])
-    explained = np.sum(along**2 / size[:, None], axis=0) / variance
-    return np.asarray(scipy.special.chdtrc(size.size, explained))
+    noisy = variance > 0.0  # not where nothing is left
+    explained = np.sum(along**2 / size[:, None], axis=0) / np.where(noisy, variance, 1.0)
+    return np.where(noisy, scipy.special.chdtrc(size.size, explained), 1.0)
 
 
 def _distinct(products: Real, power: float) -> tuple[Real, Real]:

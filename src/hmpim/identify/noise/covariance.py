@@ -75,8 +75,11 @@ def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
     `gram`, (p, p), holds the products of the rows, and `power` is the residual's sum of squares.
     None where the products determine a direction too inaccurately.
     """
-    scale = np.sqrt(gram.diagonal())
-    inverse = _inverse_factor(gram / np.outer(scale, scale)) if scale.all() else None
+    power_of = gram.diagonal()
+    if not (power_of > 0.0).all():  # below 0 by rounding
+        return None
+    scale = np.sqrt(power_of)
+    inverse = _inverse_factor(gram / np.outer(scale, scale))
     if inverse is None:
         return None
     return np.asarray(inverse @ inverse.T * (power / freedom) / np.outer(scale, scale))

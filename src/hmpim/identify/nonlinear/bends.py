@@ -285,10 +285,10 @@ def _regressed(slopes: Real, traces: Real, residual: Real) -> tuple[Real, Real, 
     along, own = traces @ q, residual @ q
     whole = np.vecdot(traces, traces)
     power = whole - np.vecdot(along, along)
-    distinct = power > _ALIKE * whole
+    total = float(residual @ residual - own @ own)
+    distinct = power > np.maximum(_ALIKE * whole, np.finfo(float).tiny * total)
     product = traces @ residual - along @ own
     weights = np.where(distinct, product, 0.0) / np.where(distinct, power, 1.0)
-    total = float(residual @ residual - own @ own)
     freedom = max(residual.size - q.shape[1], 1)
     if total <= 0.0:
         return weights, np.zeros(weights.size), q

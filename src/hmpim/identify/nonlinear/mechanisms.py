@@ -221,6 +221,8 @@ def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iter
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)
     fastest = float(np.max(np.abs(step)))
+    if fastest == 0.0:  # it stands still
+        return
 
     share = x / largest
     square = largest * share**2

@@ -66,7 +66,7 @@ def sweep_phase(u: Real, fs: float) -> SweepPhase | None:
     inside &= (sample >= crossings[0]) & (sample <= crossings[-1])
     level = x / np.maximum(envelope, np.sqrt(DEEPEST) * envelope.max())
     error = np.where(inside, (level - np.cos(phase)) ** 2, 0.0)
-    inside &= _locally(error, level, crossings) < FEW
+    inside &= _is_followed(error, level, crossings)
     power = float(level[inside] @ level[inside])
     # A sinusoid does not explain 1.4 % of a triangle's power, and 19 % of a square wave's.
     if np.mean(inside) < MOST or float(np.sum(error[inside])) > MATERIAL * power:
@@ -86,16 +86,16 @@ def _centre(x: Real) -> float:
     return float(np.median(0.5 * (x[turns[1:]] + x[turns[:-1]])))
 
 
-def _locally(error: Real, level: Real, crossings: Real) -> Real:
-    """Share of unexplained power in the three half turns around each sample."""
+def _is_followed(error: Real, level: Real, crossings: Real) -> Mask:
+    """Whether little power is unexplained in the three half turns around each sample."""
     starts = np.unique(np.clip(np.ceil(crossings).astype(np.intp), 0, error.size - 1))
     sums = np.add.reduceat(np.stack([error, level**2]), starts, axis=1)
     wide = sums.copy()
     wide[:, 1:] += sums[:, :-1]
     wide[:, :-1] += sums[:, 1:]
-    share = wide[0] / np.maximum(wide[1], np.finfo(float).tiny)
+    little = wide[0] < FEW * wide[1]  # not where the input stands still
     which = np.searchsorted(starts, np.arange(error.size), side="right") - 1
-    return np.asarray(share[np.maximum(which, 0)])
+    return np.asarray(little[np.maximum(which, 0)])
 
 
 def _finer(x: Real) -> Real:

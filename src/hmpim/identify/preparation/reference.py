@@ -18,6 +18,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem, within_reach
+from hmpim.identify.fitting.least_squares import UNSEEN
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
@@ -157,8 +158,13 @@ def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real
     freedom = max(problem.counted - rows.shape[0], 1)
     white = is_white(problem.counting(residual))
     # (tools rowsᵀ)⁻¹ tools R toolsᵀ (…)⁻ᵀ: the bound for the instrument, turned to the input.
-    turn = np.linalg.lstsq(tools @ rows.T, tools @ tools.T, rcond=1e-14)[0]
+    size = np.sqrt(np.maximum(np.sum(tools**2, axis=1), np.finfo(float).tiny))
+    tools, rows = tools / size[:, None], rows / size[:, None]
+    left, values, right = np.linalg.svd(tools @ rows.T)
+    # A direction that is not determined is left wide open.
+    turn = right.T / np.maximum(values, UNSEEN * values[0]) @ left.T @ (tools @ tools.T)
     cov = turn @ covariance(tools, residual, freedom=freedom, white=white) @ turn.T
+    cov = cov / np.outer(size, size)
     best = replace(joint.best, fit=fit)
     trials = tuple(best if trial is joint.best else trial for trial in joint.trials)
     return replace(joint, best=best, trials=trials), np.asarray(cov)

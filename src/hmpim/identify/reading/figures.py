@@ -23,7 +23,15 @@ from hmpim.model.response import (
 )
 from hmpim.units import quotient_unit
 
-__all__ = ["figures_at", "figures_of", "gradient", "read_figures", "system_of", "units_of"]
+__all__ = [
+    "figures_at",
+    "figures_of",
+    "gradient",
+    "read_figures",
+    "system_of",
+    "units_of",
+    "variance_of",
+]
 
 
 def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
@@ -109,7 +117,7 @@ def read_figures(
     unit_of = units_of(structure, units)
 
     def read(name: str, value: float) -> Estimate:
-        variance = float(slopes[name] @ cov @ slopes[name])
+        variance = variance_of(slopes[name], cov)
         return estimate(value, variance, freedom=effective, unit=unit_of[name])
 
     given = {name: read(name, value) for name, value in values.items() if value is not None}
@@ -137,6 +145,13 @@ def _slopes(
             lambda v: dominant_time_constant(system_of(structure, v, fs)) or float("nan"), vector
         )
     return slopes
+
+
+def variance_of(slope: Real, cov: Real) -> float:
+    """Variance of a figure by its derivatives, (p,), to first order, and at least its rounding."""
+    # Along a direction that the record leaves open nearly everything cancels.
+    rounding = np.finfo(float).eps * float(np.abs(slope) @ np.abs(cov) @ np.abs(slope))
+    return max(float(slope @ cov @ slope), rounding)
 
 
 def gradient(function: Callable[[Real], float] | Callable[[Real], Real], at: Real) -> Real:

@@ -13,7 +13,7 @@ from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
 from hmpim.identify.noise.level import steadiness
 from hmpim.identify.noise.whiteness import is_steady, is_white
-from hmpim.identify.reading.figures import gradient, read_figures
+from hmpim.identify.reading.figures import gradient, read_figures, variance_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.model.response import RationalDelay
@@ -44,7 +44,7 @@ class Readings:
     def variance(self, function: Callable[[Real], float]) -> float:
         """Variance of a function of `vector`, to first order."""
         slope = gradient(function, self.vector)
-        return float(slope @ self.covariance @ slope)
+        return variance_of(slope, self.covariance)
 
 
 def read_parameters(

@@ -134,7 +134,7 @@ def choose(
     """Fit every structure and choose one, as from samples; every fit is a `Fitted`.
 
     Arguments are those of `identify_statistics`. A `RecordError` is raised if too few samples
-    count.
+    count, or the output stands still where they do.
     """
     if intersample == "sampled":
         raise RecordError("intersample='sampled' needs the samples; identify the record itself")
@@ -166,6 +166,12 @@ def _look_and_choose(
         if joint is not None and (skipped, to_the_end) == (products.skipped, products.to_the_end):
             break
         products = Products(data.products.statistics, skipped=skipped, to_the_end=to_the_end)
+        if products.energy <= 0.0:
+            raise RecordError(
+                f"output {data.products.statistics.names[1]!r} moves only in the first {skipped} "
+                "samples, which may answer input before the record; compress with fewer lags, or "
+                "record longer"
+            )
         data = replace(data, products=products)
         fits = [refit(data.problem(course.natural, _ALL), fit) for fit in course.fits]
         joint = chosen_of(replace(course, data=data, fits=fits), names)

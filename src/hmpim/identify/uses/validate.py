@@ -365,7 +365,11 @@ def _model_std(
         replace(model, hold_period=None, nonlinear=None if force else model.nonlinear)
         for model, force in zip(models, forced, strict=True)
     ]
-    drawn = [draw_models(model, _DRAWS, rng=0) for model in free]
+    earliest = (1 - aligned.samples) / aligned.fs  # ahead of the whole record nothing is left
+    drawn = [
+        [replace(one, delay=max(one.delay, earliest)) for one in draw_models(model, _DRAWS, rng=0)]
+        for model in free
+    ]
     predictions = [_predicted(some, pairs, aligned) for some in zip(*drawn, strict=True)]
     std = np.asarray(np.std(predictions, axis=0))
     for model, own, one, pair in zip(models, moved, free, pairs, strict=True):
