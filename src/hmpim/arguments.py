@@ -307,7 +307,7 @@ def generator(rng: np.random.Generator | int | None) -> np.random.Generator:
     True
     >>> generator(-1)
     Traceback (most recent call last):
-    hmpim.errors.ArgumentError: rng = -1 is no seed; give a whole number from 0 on
+    hmpim.errors.ArgumentError: rng = -1 is not a seed; give a whole number from 0 on
     """
     if isinstance(rng, np.random.Generator):
         return rng

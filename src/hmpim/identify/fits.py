@@ -159,7 +159,7 @@ class _WithRows:
             self.humming = with_hum(joint, self.with_rows)
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
-        # Only inputs that the output is known to follow are used to test for a drift in that asked.
+        # Besides that asked, only inputs that the output follows are used to test for a drift.
         others = ((i, fit) for i, fit in enumerate(steady.fits) if i != self.asked)
         unrelated = {i: fit for i, fit in others if not fit.related}
         self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.arguments import check_size, checked, shown
+from hmpim.arguments import checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.channel import Channel, Intersample, frozen_samples, in_seconds
@@ -402,4 +402,3 @@ def _check_unique(names: Sequence[str]) -> None:
 def _check_rate(fs: float) -> None:
     if not (np.isfinite(fs) and fs > 0):
         raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")
-    check_size("fs", fs, "Hz")

@@ -1,7 +1,7 @@
 """Comparison of two results of one unit within their error bars: after a repair, for example."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hmpim.arguments import checked
 from hmpim.errors import RecordError, UnitError
@@ -132,9 +132,7 @@ def _converted(
         ) from None
     low, high = (None if end is None else factor * end for end in was.ci95 or (None, None))
     std = None if was.std is None else factor * was.std
-    return Estimate(
-        value=factor * was.value, std=std, ci95=(low, high), unit=now.unit, verdict=was.verdict
-    )
+    return replace(was, value=factor * was.value, std=std, ci95=(low, high), unit=now.unit)
 
 
 def _units_of_gains(
