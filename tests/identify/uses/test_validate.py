@@ -295,3 +295,25 @@ def test_a_delay_that_its_record_left_open_is_validated(result):
     unsure = replace(result, pairs=(replace(pair, covariance=left_open),))
     (output,) = hmpim.validate(unsure, hmpim.run(SENSOR, SWEEP, rng=2)).outputs
     assert np.isfinite(output.std).all()
+
+
+@pytest.mark.parametrize("damping", [0.05, 0.4])
+@pytest.mark.parametrize("begins", [2.0, 4.0])
+def test_a_right_model_is_valid_on_a_record_that_begins_in_motion(damping, begins):
+    """Five time constants after the beginning its free response is many times the noise."""
+    sensor = replace(SENSOR, natural_frequency=5, damping_ratio=damping, noise_std=0.001)
+    found = hmpim.identify(hmpim.run(sensor, SWEEP, rng=1))
+    whole = hmpim.run(sensor, SWEEP, rng=2)
+    assert hmpim.validate(found, cut(whole, begins)).passed
+    other = replace(sensor, natural_frequency=5.01)
+    assert not hmpim.validate(found, cut(hmpim.run(other, SWEEP, rng=2), begins)).passed
+
+
+def cut(record, begins):
+    def later(channels):
+        return tuple(
+            replace(c, time=c.time[c.time >= begins], values=c.values[c.time >= begins])
+            for c in channels
+        )
+
+    return replace(record, inputs=later(record.inputs), outputs=later(record.outputs))

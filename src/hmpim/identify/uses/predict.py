@@ -1,6 +1,7 @@
 """A model from an identification, and its prediction of another record."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -18,6 +19,7 @@ from hmpim.record import Finding, Record, uniform
 __all__ = [
     "Prediction",
     "fit_percent_of",
+    "free_responses",
     "has_model",
     "predict",
     "rate_of",
@@ -136,6 +138,19 @@ def settling_time(model: Model) -> float:
         size = np.clip(np.abs(np.roots(model.denominator)), 1e-12, 1 - 1e-12)
         slowest = float(np.max(-1.0 / np.log(size), initial=0.0) / model.fs)
     return max(model.delay, 0.0) + FORGETS * slowest
+
+
+def free_responses(models: Sequence[Model], time: Real) -> Real:
+    """Free responses of the models' initial states, (k, n), from the first of times in s on."""
+    after = time - time[0]
+    rows = []
+    for model in models:
+        poles = np.roots(model.denominator)
+        if model.intersample == "sampled" and model.fs is not None:
+            poles = model.fs * np.log(poles[np.abs(poles) > np.finfo(float).eps].astype(complex))
+        waves = np.exp(poles[poles.imag >= 0.0, None] * after)
+        rows += [waves.real, waves.imag[poles[poles.imag >= 0.0].imag > 0.0]]
+    return np.concatenate(rows)
 
 
 def _value(estimate: Estimate | None) -> float | None:

@@ -12,6 +12,7 @@ from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import DEVIATIONS, FALSE_ALARM, HALF
 from hmpim.identify.effects.hold import detect_hold, updates
+from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.noise.misfit import misfit
 from hmpim.identify.noise.whiteness import effective_share, ljung_box
 from hmpim.identify.result import Identification, PairIdentification
@@ -20,7 +21,13 @@ from hmpim.identify.result.plain import plain
 from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.uses.gains import check_units
 from hmpim.identify.uses.nonlinear import all_applied
-from hmpim.identify.uses.predict import fit_percent_of, has_model, settling_time, to_model
+from hmpim.identify.uses.predict import (
+    fit_percent_of,
+    free_responses,
+    has_model,
+    settling_time,
+    to_model,
+)
 from hmpim.identify.worth import MATERIAL, ROUNDING
 from hmpim.model import Model, draw_models, simulate
 from hmpim.record import Aligned, Finding, Record, uniform
@@ -234,8 +241,9 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     Notes
     -----
     The whole chain is predicted. The input before the record is unknown, so that scoring begins
-    after the settling time of the model. Clipped samples do not count, and only the updates of a
-    held output do. The prediction of an integrator may have any offset. A residual that follows the
+    after the settling time of the model, and what is left of the free response then is fitted: of
+    an integrator, its offset. Clipped samples do not count, and only the updates of a held output
+    do. A residual that follows the
     input counts against the result only beyond the error bars, at the same chance. Rounding is not
     noise: it may have any colour and follow the input. A residual of at most 1e-9 of the output
     (r.m.s.), as with exact software, has no bounds but that of the fit.
@@ -295,8 +303,11 @@ def _validated(
             f"only {np.count_nonzero(scored)} samples of {y.name!r} are left to score, once the "
             "model has settled and without gaps and clipping; give a longer record"
         )
-    if any(model.denominator[-1] == 0.0 for model in models):
-        predicted = predicted + float(np.mean((y.values - predicted)[scored]))
+    begins = int(np.argmax(scored))  # the record may begin in motion, and an integrator anywhere
+    rows = free_responses(models, aligned.time[begins:])
+    if rows.size:
+        weights, _ = solved_exactly(rows[:, scored[begins:]], (y.values - predicted)[scored])
+        predicted[begins:] += weights @ rows
     residual = np.where(scored, y.values - predicted, 0.0)
     std = np.hypot(noise, model_std)
     fit = fit_percent_of(y.values[scored], residual[scored])
