@@ -65,6 +65,14 @@ def test_there_and_back_is_one(units, data):
     )
 
 
+@pytest.mark.parametrize("units", [("count", "deg"), ("rad", "count"), ("V/count", "V/deg")])
+def test_a_count_is_not_an_angle(units):
+    """Else a limit of 10 deg would hold for 573 counts, whatever they are worth."""
+    with pytest.raises(UnitError, match="what a count is worth is not known"):
+        conversion_factor(units[0], to=units[1])
+    assert conversion_factor("count", to="kilocount") == pytest.approx(1e-3)
+
+
 def test_dimensions_must_agree():
     with pytest.raises(UnitError, match="'deg' cannot be turned into 'm'"):
         conversion_factor("deg", to="m")

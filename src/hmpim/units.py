@@ -118,7 +118,8 @@ def conversion_factor(unit: str, *, to: str) -> float:
     Raises
     ------
     UnitError
-        If either is unknown, the dimensions differ, or their zeros do, as of 'degC' and 'K'.
+        If either is unknown, the dimensions differ, or their zeros do, as of 'degC' and 'K'; or if
+        one is in counts.
 
     Examples
     --------
@@ -135,6 +136,11 @@ _ANGLES = {("deg", "rad"): math.pi / 180.0, ("rad", "deg"): 180.0 / math.pi}
 def _factor(unit: str, to: str) -> float:
     if (unit, to) in _ANGLES:  # asked for by every table; the registry takes half a second
         return _ANGLES[unit, to]
+    if unit and to and _counts(unit) != _counts(to):
+        raise UnitError(
+            f"unit {unit!r} cannot be turned into {to!r}: what a count is worth is not known; "
+            "scale the channel"
+        )
     try:
         zero, size = (
             float(_registry().Quantity(value, _parsed(unit)).to(_parsed(to)).magnitude)
@@ -145,6 +151,12 @@ def _factor(unit: str, to: str) -> float:
     if zero:
         raise UnitError(f"unit {unit!r} cannot be turned into {to!r} by a factor: its zero differs")
     return size
+
+
+def _counts(unit: str) -> list[object]:
+    """Powers of counts in a unit, which pint takes for numbers, and so for radians."""
+    items = _registry().Quantity(1.0, _parsed(unit)).unit_items()
+    return [power for name, power in items if name.endswith("count")]
 
 
 # By how they are written: what pint takes for something else, or for nothing.
