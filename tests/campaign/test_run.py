@@ -18,7 +18,7 @@ from hmpim.campaign.cases import prepare
 from hmpim.campaign.grids import change_grid
 from hmpim.campaign.rig import make_rig
 from hmpim.campaign.study import make_study, study_dict
-from hmpim.campaign.write import write_study
+from hmpim.campaign.write import headline, write_study
 from hmpim.errors import ArgumentError, FormatError, HmpimError, LimitsError
 from hmpim.experiment import run
 from hmpim.formats.recording import read_recording
@@ -246,6 +246,26 @@ def test_comparison_finds_what_moved_and_only_that(finished, tmp_path):
     assert [(c.axis, c.quantity) for c in other.changes if c.differs] == [("inner", "delay")]
     # On a phone the two figures stand beside their names, and the long name of the case after them.
     assert change_grid(other).columns == ("Axis", "Quantity", "Before", "Now", "Case")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("bandwidth_phase90", "1 of them rests on a doubtful figure. 1 of 1 rows have doubtful"),
+        ("bias", "No check rests on a doubtful figure. 1 of 1 rows have other doubtful"),
+    ],
+)
+def test_the_headline_says_whether_a_check_rests_on_a_doubtful_figure(finished, name, said):
+    plan, _, cases = finished
+    study = make_study(plan, cases)
+    (check,) = [c for c in study.checks if c.wanted.quantity == "bandwidth_phase90"][:1]
+    parameters = {
+        key: replace(value, verdict="doubtful" if key == name else "ok")
+        for key, value in check.row.parameters.items()
+    }
+    row = replace(check.row, verdict="doubtful", parameters=parameters)
+    doubted = replace(check, row=row, reading=parameters["bandwidth_phase90"])
+    assert said in headline(replace(study, rows=(row,), checks=(doubted,)))
 
 
 def test_page_needs_nothing_from_outside(finished, tmp_path):

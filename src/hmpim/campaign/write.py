@@ -102,9 +102,12 @@ def headline(study: Study) -> str:
         said = f"{failed} of {count} checks are not met."
     if resting:
         said += f" {resting} of them {'rests' if resting == 1 else 'rest'} on a doubtful figure."
+    elif unsure and count:
+        said += " No check rests on a doubtful figure."
     if unsure:
         names = doubtful_words(unsure)
-        said += f" {len(unsure)} of {len(study.rows)} rows have doubtful figures"
+        other = "other " if count and not resting else ""
+        said += f" {len(unsure)} of {len(study.rows)} rows have {other}doubtful figures"
         said += f": {names}." if names else "."
     return said
 
