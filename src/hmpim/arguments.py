@@ -21,6 +21,7 @@ from hmpim.errors import ArgumentError
 __all__ = [
     "MOST_SAMPLES",
     "check_argument",
+    "check_rate",
     "check_size",
     "checked",
     "fits",
@@ -257,6 +258,22 @@ def shown(value: object) -> str:
 _LONGEST = 41
 
 
+def check_rate(fs: float) -> None:
+    """Refuse a sampling rate that is not a positive number of Hz.
+
+    Raises
+    ------
+    ArgumentError
+        If it is zero, negative, NaN or infinite.
+
+    Examples
+    --------
+    >>> check_rate(200.0)
+    """
+    if not 0.0 < fs < math.inf:
+        raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")
+
+
 def check_size(name: str, value: float, unit: str = "", *, added: bool = False) -> None:
     """Refuse a size so large or so small that numbers computed from it overflow.
 
@@ -286,9 +303,8 @@ def check_size(name: str, value: float, unit: str = "", *, added: bool = False) 
     if not math.isfinite(size) or not (small or size > _LARGEST):
         return
     much = "small" if small else "large"
-    shown = f"{value:g} {unit}".rstrip()
     raise ArgumentError(
-        f"{name} = {shown} is too {much} to compute with; "
+        f"{name} = {f'{value:g} {unit}'.rstrip()} is too {much} to compute with; "
         f"sizes may be from {1.0 / _LARGEST:g} to {_LARGEST:g}"
     )
 

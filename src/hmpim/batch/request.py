@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, Self
 
-from hmpim.arguments import checked
+from hmpim.arguments import check_rate, checked
 from hmpim.errors import ArgumentError
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.record import Intersample
@@ -78,8 +78,8 @@ class Request:
     lags: int | None = None
 
     def __post_init__(self) -> None:
-        if self.fs is not None and not 0.0 < self.fs < float("inf"):
-            raise ArgumentError(f"fs = {self.fs} Hz is not a sampling rate; it must be positive")
+        if self.fs is not None:
+            check_rate(self.fs)
         if self.lags is not None and not self.pool_by:
             raise ArgumentError(
                 f"lags = {self.lags} is for records identified as one; say which: pool_by='serial'"

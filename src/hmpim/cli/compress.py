@@ -20,6 +20,7 @@ from hmpim.cli.reading import (
     Unit,
     read_records,
     reading,
+    refuse_options,
     units_of,
 )
 from hmpim.cli.terminal import say, working
@@ -131,17 +132,16 @@ def _refuse_unused(records: Sequence[Path], about_samples: Mapping[str, object])
     from hmpim.formats.statistics_files import holds_statistics
 
     if all(holds_statistics(path) for path in records):
-        _refuse_options(records[0], about_samples)
+        _refuse_without_samples(records[0], about_samples)
 
 
-def _refuse_options(compressed: Path, about_samples: Mapping[str, object]) -> None:
+def _refuse_without_samples(compressed: Path, about_samples: Mapping[str, object]) -> None:
     """Refuse options that only a record has a use for."""
-    for option, wanted in about_samples.items():
-        if wanted is not None:
-            raise ArgumentError(
-                f"{option} is about the samples of a record, and {compressed} holds statistics "
-                "of them; leave it out, or give the record"
-            )
+    refuse_options(
+        about_samples,
+        f"is about the samples of a record, and {compressed} holds statistics of them; leave it "
+        "out, or give the record",
+    )
 
 
 def refuse_twice(joined: "Statistics", names: Sequence[str] | None = None) -> None:
@@ -189,7 +189,7 @@ def statistics_of(
             f"{compressed[0]} holds statistics and {others[0]} does not; compress both with hmpim "
             "compress, or give the records themselves"
         )
-    _refuse_options(compressed[0], reading_options)
+    _refuse_without_samples(compressed[0], reading_options)
     joined = read_statistics(compressed[0])
     for path in compressed[1:]:
         joined = _join(joined, read_statistics(path), (compressed[0], path))

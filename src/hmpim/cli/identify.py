@@ -41,6 +41,7 @@ from hmpim.cli.reading import (
     Unit,
     read_records,
     reading,
+    refuse_options,
     units_of,
 )
 from hmpim.cli.several import identify_several
@@ -339,11 +340,10 @@ def _by_hand(given: Sequence[str]) -> dict[str, float]:
 
 def _check_single(count: int, options: Mapping[str, object]) -> None:
     """Refuse options that are about one record where there are several."""
-    for option, wanted in options.items():
-        if count > 1 and wanted is not None:
-            raise ArgumentError(
-                f"{option} applies to one record, but {count} are given; leave it out, or give one"
-            )
+    if count > 1:
+        refuse_options(
+            options, f"applies to one record, but {count} are given; leave it out, or give one"
+        )
 
 
 def write_result(

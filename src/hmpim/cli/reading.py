@@ -32,6 +32,7 @@ __all__ = [
     "Unit",
     "read_records",
     "reading",
+    "refuse_options",
     "say_broken_readers",
     "seconds",
     "units_of",
@@ -155,6 +156,13 @@ def seconds(text: str, option: str) -> float:
         raise ArgumentError(
             f"{option}: {text!r} is not a time; write it as 3.2ms or 0.0032"
         ) from None
+
+
+def refuse_options(options: Mapping[str, object], why: str) -> None:
+    """Refuse the first of options that is given; `why` continues a sentence about it."""
+    for option, given in options.items():
+        if given is not None:
+            raise ArgumentError(f"{option} {why}")
 
 
 def units_of(given: Sequence[str] | None) -> dict[str, str]:

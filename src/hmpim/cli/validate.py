@@ -18,6 +18,7 @@ from hmpim.cli.reading import (
     To,
     Unit,
     reading,
+    refuse_options,
     units_of,
 )
 from hmpim.cli.terminal import output_console, working
@@ -91,12 +92,13 @@ def validate(
             "there is nothing to compare the result with; give a RECORD, or --against OLD"
         )
     if record is None:
-        _check_of_record(
+        refuse_options(
             {
                 **{"--fit": fit, "--fs": fs, "--time": time, "--unit": unit, "--from": from_},
                 **{"--to": to, "--sweep": sweep, "--sheet": sheet},
                 "--stamps": None if stamps is Stamps.AUTO else stamps,
-            }
+            },
+            "is about a record, and none is given; give a RECORD",
         )
     check_files(
         reads={"the result": result, "the record": record, "the older result": against},
@@ -138,13 +140,6 @@ def validate(
         write_text(json, dumps(figures, indent=1, allow_nan=False) + "\n")
     if not figures["passed"]:
         raise typer.Exit(NOT_MET)
-
-
-def _check_of_record(options: Mapping[str, object]) -> None:
-    """Refuse options that are about a record where none is given."""
-    for option, given in options.items():
-        if given is not None:
-            raise ArgumentError(f"{option} is about a record, and none is given; give a RECORD")
 
 
 def _read(record: Path, found: "Identification", how: Mapping[str, Any]) -> Any:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hmpim.arguments import checked, shown
+from hmpim.arguments import check_rate, checked, shown
 from hmpim.equality import ByValue
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.record.channel import Channel, Intersample, frozen_samples, in_seconds
@@ -86,7 +86,7 @@ class Record(ByValue):
             object.__setattr__(self, role, tuple(getattr(self, role)))
         names = [c.name for c in self.channels]
         _check_unique(names)
-        _check_rate(self.fs)
+        check_rate(self.fs)
         if self.band is not None:
             object.__setattr__(self, "band", _rising(self.band))
 
@@ -171,7 +171,7 @@ class Record(ByValue):
         if fs is None and time is None:
             raise ArgumentError("neither fs nor time is given; one of them is needed")
         if fs is not None:
-            _check_rate(fs)
+            check_rate(fs)
         given = (_by_name("u", inputs), _by_name("y", outputs), references or {}, auxiliary or {})
         _check_unique([name for part in given for name in part])
         named = {name: values for part in given for name, values in part.items()}
@@ -397,8 +397,3 @@ def _check_unique(names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise RecordError(f"channel name {twice[0]!r} is used twice; names must be unique")
-
-
-def _check_rate(fs: float) -> None:
-    if not (np.isfinite(fs) and fs > 0):
-        raise ArgumentError(f"fs = {fs} Hz is not a sampling rate; it must be positive and finite")

@@ -1,14 +1,13 @@
 """What a reader is: three functions and the facts that a person needs about its format."""
 
 import importlib
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
 
-from hmpim.arguments import check_size
+from hmpim.arguments import check_rate, check_size
 from hmpim.errors import ArgumentError, MissingExtraError
 from hmpim.record import Finding, Intersample, Series, Stopping
 
@@ -68,13 +67,9 @@ class Layout:
     sheet: str | None = None
 
     def __post_init__(self) -> None:
-        if self.fs is None:
-            return
-        if not 0.0 < self.fs < math.inf:
-            raise ArgumentError(
-                f"fs = {self.fs} Hz is not a sampling rate; it must be positive and finite"
-            )
-        check_size("fs", self.fs, "Hz")
+        if self.fs is not None:
+            check_rate(self.fs)
+            check_size("fs", self.fs, "Hz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

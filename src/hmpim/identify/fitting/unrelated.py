@@ -33,7 +33,7 @@ def is_unexplainable(
     log-likelihood that an answer must promise. They are aligned by the delay of the best fit so
     far, or by the lag of their greatest correlation.
     """
-    if np.ptp(problem.y if problem.valid is None else problem.y[problem.valid]) == 0.0:
+    if np.ptp(problem.counting(problem.y)) == 0.0:
         return True  # it stands still wherever it counts
     if not _is_unrelated(problem, fit):
         return False

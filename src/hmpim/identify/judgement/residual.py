@@ -112,8 +112,7 @@ def coloured_noise(evidence: Evidence) -> Iterator[Finding]:
 
 def changing_noise(evidence: Evidence) -> Iterator[Finding]:
     """Say that the noise is louder at some times than at others."""
-    weighed, valid = evidence.joint.weighed, evidence.joint.problem.valid
-    noise = weighed.as_loud(evidence.readings.innovations)
+    noise, valid = _noise_of(evidence), evidence.joint.problem.valid
     if is_steady(noise):
         return
     counted = np.arange(noise.size) if valid is None else np.flatnonzero(valid)
@@ -132,14 +131,18 @@ def changing_noise(evidence: Evidence) -> Iterator[Finding]:
     )
 
 
+def _noise_of(evidence: Evidence) -> Real:
+    """The whitened residual with its own level at each sample, (n,)."""
+    return evidence.joint.weighed.as_loud(evidence.readings.innovations)
+
+
 def filled_input(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the noise if it varies with time where samples of the input were filled in.
 
     Samples that depend on filled-in input count where few others would be left. Its errors enter
     the residual, and are large where the input moves fast.
     """
-    noise = evidence.joint.weighed.as_loud(evidence.readings.innovations)
-    if not evidence.filled or is_steady(noise):
+    if not evidence.filled or is_steady(_noise_of(evidence)):
         return
     yield Finding(
         code="filled_input",

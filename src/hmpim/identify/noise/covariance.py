@@ -75,10 +75,10 @@ def white_covariance(gram: Real, power: float, *, freedom: int) -> Real | None:
     `gram`, (p, p), holds the products of the rows, and `power` is the residual's sum of squares.
     None where the products determine a direction too inaccurately.
     """
-    power_of = gram.diagonal()
-    if not (power_of > 0.0).all():  # below 0 by rounding
+    diagonal = gram.diagonal()
+    if not (diagonal > 0.0).all():  # below 0 by rounding
         return None
-    scale = np.sqrt(power_of)
+    scale = np.sqrt(diagonal)
     inverse = _inverse_factor(gram / np.outer(scale, scale))
     if inverse is None:
         return None

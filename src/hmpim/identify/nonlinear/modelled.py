@@ -233,7 +233,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
         )
         return np.asarray(fit.nuisance[-1] * one.again(problem, moved).row)
 
-    for i, step in enumerate(_within_reach(fit, scale)):
+    for i, step in enumerate(_stable_steps(fit, scale)):
         if not step:
             continue  # at the edge of the structure
         aside = np.zeros(vector.size)
@@ -242,7 +242,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     return out
 
 
-def _within_reach(fit: Fit, steps: Real) -> Real:
+def _stable_steps(fit: Fit, steps: Real) -> Real:
     """Steps of theta to either side of which the model is stable and of like dynamics, (p + 1,)."""
     out, start = steps.copy(), 1
     for order in fit.structure.sections:

@@ -84,8 +84,7 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
     if record.intersample == "sampled":
         raise ArgumentError(
             f"reference={reference!r} is for a plant, not for software "
-            "(intersample='sampled'); leave "
-            "one of the two out"
+            "(intersample='sampled'); leave one of the two out"
         )
     driver = next((c for c in record.channels if c.name == reference), None)
     if driver is None or driver in record.outputs or driver in record.inputs:

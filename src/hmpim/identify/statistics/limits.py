@@ -40,8 +40,7 @@ def drift_or_noise(evidence: Evidence) -> Iterator[Finding]:
         code="drift_or_noise",
         message=f"{100 * share:.0f} % of the noise's power is slower than the window of "
         f"{lags / evidence.fs:.3g} s: it may be a drifting bias. Compress with knots, "
-        "between which "
-        "the bias may change.",
+        "between which the bias may change.",
         severity="doubt",
         parameters=("noise_std",),
     )

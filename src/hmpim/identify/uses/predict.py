@@ -148,8 +148,9 @@ def free_responses(models: Sequence[Model], time: Real) -> Real:
         poles = np.roots(model.denominator)
         if model.intersample == "sampled" and model.fs is not None:
             poles = model.fs * np.log(poles[np.abs(poles) > np.finfo(float).eps].astype(complex))
-        waves = np.exp(poles[poles.imag >= 0.0, None] * after)
-        rows += [waves.real, waves.imag[poles[poles.imag >= 0.0].imag > 0.0]]
+        upper = poles[poles.imag >= 0.0]
+        waves = np.exp(upper[:, None] * after)
+        rows += [waves.real, waves.imag[upper.imag > 0.0]]
     return np.concatenate(rows)
 
 

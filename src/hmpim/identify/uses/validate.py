@@ -243,10 +243,10 @@ def validate(result: Identification, record: Record, *, bounds: Bounds | None = 
     The whole chain is predicted. The input before the record is unknown, so that scoring begins
     after the settling time of the model, and what is left of the free response then is fitted: of
     an integrator, its offset. Clipped samples do not count, and only the updates of a held output
-    do. A residual that follows the
-    input counts against the result only beyond the error bars, at the same chance. Rounding is not
-    noise: it may have any colour and follow the input. A residual of at most 1e-9 of the output
-    (r.m.s.), as with exact software, has no bounds but that of the fit.
+    do. A residual that follows the input counts against the result only beyond the error bars, at
+    the same chance. Rounding is not noise: it may have any colour and follow the input. A residual
+    of at most 1e-9 of the output (r.m.s.), as with exact software, has no bounds but that of the
+    fit.
 
     Examples
     --------

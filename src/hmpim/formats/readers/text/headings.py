@@ -276,8 +276,7 @@ def _refuse_width(line: str, dialect: Dialect, name: str) -> None:
     )
     if dialect.delimiter == "," and dialect.width in (2 * len(cells), 2 * len(cells) - 1):
         raise FormatError(
-            f"{message}: a decimal comma is not a delimiter; export it with decimal "
-            "points, or with "
-            "semicolons between the columns"
+            f"{message}: a decimal comma is not a delimiter; export it with decimal points, or "
+            "with semicolons between the columns"
         )
     raise FormatError(f"{message}; give every column a name")
