@@ -106,7 +106,7 @@ def _add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outp
                 gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
                 if beside.related and leaves_noise(beside, one) and gain > most:
                     kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
-                    bending, own = described(beside, one, course.natural)
+                    bending, own = described(beside, one, course.natural, question.aligned.fs)
                     lead = replace(other, fits=(kept,), bending=bending, covariances=(own,))
                     most = gain
     return lead

@@ -5,7 +5,7 @@ x is the output of the linear part, 1/A the dynamics, z the whole output, each w
 =====================  =============================================================
 rate_limit             the command is followed at no more than a speed
 dead_zone              the command does nothing within half a width
-friction               a second-order unit with a constant force against its motion
+friction               a unit of second or third order with a constant force against its motion
 hardening, softening   z = x -+ (1/A) z^3: a spring force beyond proportion, or below
 asymmetry              the same with z^2, or x + x^2
 curvature              x + x^3: a scale that changes with the deflection
@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError
 from hmpim.model.driven import driven
 from hmpim.model.fine import FINE, finely, joined, sampled
-from hmpim.model.operators import play, power_of, rate_limited, rubbed
+from hmpim.model.friction import Rubbing, rubbed
+from hmpim.model.operators import play, power_of, rate_limited
 from hmpim.model.response import RationalDelay, per_step
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
@@ -105,11 +106,15 @@ class NonlinearPart:
         limited.
     between : {'zoh', 'foh', 'bandlimited'}
         What its command does between its samples.
+    lag : float
+        Of friction, between the command and the force that moves the unit, s: 0 in a unit of second
+        order.
 
     Raises
     ------
     ArgumentError
-        If the size is not that of its kind, or the reach is not positive.
+        If the size is not that of its kind, the reach is not positive, or a lag is not that of
+        friction.
 
     Examples
     --------
@@ -124,6 +129,7 @@ class NonlinearPart:
     std: float
     reach: float
     between: Intersample = "bandlimited"
+    lag: float = 0.0
 
     def __post_init__(self) -> None:
         if self.kind not in KIND_WORDS or self.kind == "saturation":
@@ -133,6 +139,15 @@ class NonlinearPart:
             raise ArgumentError(f"size = {self.size!r} of {self.words} must be more than 0")
         if not (np.isfinite(self.reach) and self.reach > 0.0):
             raise ArgumentError(f"reach = {self.reach!r} of {self.words} must be more than 0")
+        if not (np.isfinite(self.lag) and self.lag >= 0.0) or (self.lag and not self.rubs):
+            raise ArgumentError(
+                f"lag = {self.lag!r} s of {self.words} must be 0, or positive with friction"
+            )
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it is friction."""
+        return self.kind == "friction"
 
     @property
     def words(self) -> str:
@@ -200,12 +215,11 @@ def nonlinear_effect(
     if part.kind == "dead_zone":
         inside = sampled(np.clip(finely(u, part.between), -part.size, part.size))
         return -driven(system, prepare_input(inside, "bandlimited"), fs)
-    if part.kind == "friction":
-        return friction(part, system, finely(u, part.between), fs)
     if part.at == "output" and part.kind != "backlash":
         return part.weight * power_of(driven(system, source, fs), part.power, part.reach)
-    parts = [driven(system, source, fs, early=k / FINE) for k in range(FINE)]
-    x = joined(np.stack(parts, axis=1))
+    if part.kind == "friction":
+        return friction(part, system, source, fs)
+    x = _driven_finely(system, source, fs)
     if part.kind == "backlash":
         return np.asarray((play(x, part.size) - x)[::FINE])
     return forced(part, per_step(system.denominator, fs), x)
@@ -239,28 +253,30 @@ def farthest(part: NonlinearPart, linear: _Real, effect: _Real | None) -> float:
     return float(np.max(np.abs(linear + effect)))
 
 
-def friction(part: NonlinearPart, system: RationalDelay, fine: _Real, fs: float) -> _Real:
-    """Effect of friction at the samples, for a command on the finer clock.
+def friction(part: NonlinearPart, system: RationalDelay, source: SampledInput, fs: float) -> _Real:
+    """Effect of friction at the samples, at a rate in Hz.
 
     Raises
     ------
     ArgumentError
-        If the dynamics are not those of a second-order unit.
+        If the dynamics are not those of a unit of second or third order that returns to its
+        command, without zeros.
     """
-    below, above = system.denominator, system.numerator
-    if below.size != 3 or above.size != 1 or below[0] == 0.0:
+    if system.numerator.size != 1:
         raise ArgumentError(
-            "friction acts within a second-order unit without zeros; the denominator here is of "
-            f"degree {below.size - 1}, the numerator of degree {above.size - 1}"
+            "friction acts within a unit without zeros; the numerator here is of degree "
+            f"{system.numerator.size - 1}"
         )
-    held, free, _ = rubbed(
-        fine,
-        delay=system.delay * fs,
-        denominator=per_step(below, fs),
-        gain=float(above[0]),
-        force=part.size,
-    )
-    return np.asarray((held - free)[::FINE])
+    below = per_step(system.denominator, fs)
+    unit = Rubbing(denominator=below / (below[0] or 1.0), lag=part.lag * fs)
+    effect, _ = rubbed(_driven_finely(system, source, fs), unit, part.size)
+    return np.asarray(effect[::FINE])
+
+
+def _driven_finely(system: RationalDelay, source: SampledInput, fs: float) -> _Real:
+    """Output of the linear part on the finer clock."""
+    parts = [driven(system, source, fs, early=k / FINE) for k in range(FINE)]
+    return joined(np.stack(parts, axis=1))
 
 
 def forced(part: NonlinearPart, denominator: _Real, x: _Real) -> _Real:

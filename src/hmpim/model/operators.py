@@ -5,23 +5,18 @@ clock of `hmpim.model.fine` they are near enough to what happens between the sam
 """
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from hmpim.model.fine import FINE
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
 
 __all__ = [
-    "command_step",
     "gap_crossed",
     "play",
     "power_of",
     "pushed",
     "rate_limited",
     "reversals",
-    "rubbed",
-    "stick_slip",
 ]
 
 _Real = NDArray[np.float64]
@@ -90,75 +85,6 @@ def rate_limited(x: _Real, step: float) -> _Real:
     for begin in fast[:1]:
         out[begin : reached + 1] = late[begin : reached + 1]
     return out
-
-
-def rubbed(
-    fine: _Real, *, delay: float, denominator: _Real, gain: float, force: float
-) -> tuple[_Real, _Real, NDArray[np.bool_]]:
-    """Output of a second-order unit with Coulomb friction, and without, from rest.
-
-    Parameters
-    ----------
-    fine : ndarray, shape (m,)
-        Its command on the finer clock.
-    delay, denominator, gain : float, ndarray of shape (3,), float
-        Pure delay in samples, dynamics by rising powers of s per sample, and scale factor.
-    force : float
-        Friction, as the deflection at which the restoring force equals it.
-
-    Returns
-    -------
-    rubbed, free, moves : ndarrays, shape (m,)
-        Output with friction and without, and whether it moves.
-    """
-    at = np.arange(fine.size)
-    command = gain * np.interp(at - FINE * delay, at, fine, left=fine[0])
-    between = 0.5 * (command[:-1] + command[1:])
-    step, still = command_step(denominator), command[0]
-    top, below = scipy.signal.ss2tf(step[:, :2], step[:, 2:], np.eye(1, 2), np.zeros((1, 1)))
-    free = scipy.signal.lfilter(top[0], below, np.append(between, command[-1]) - still) + still
-    held, moves = stick_slip(step, between, still, force, float(denominator[2]))
-    return held, free, moves
-
-
-def command_step(denominator: _Real) -> _Real:
-    """Step of position and speed of a second-order unit on the finer clock, (2, 3).
-
-    It multiplies position, speed and the command, which is held over the step.
-    """
-    _, damping, inertia = denominator
-    rates = np.array([[0.0, 1.0, 0.0], [-1.0, -damping, 1.0], [0.0, 0.0, 0.0]])
-    rates[1] /= inertia
-    return np.asarray(scipy.linalg.expm(rates / FINE)[:2])
-
-
-def stick_slip(
-    step: _Real, between: _Real, still: float, force: float, inertia: float
-) -> tuple[_Real, NDArray[np.bool_]]:
-    """Output of a unit with friction, and whether it moves, from rest at `still`.
-
-    `step`, (2, 3), takes position, speed and the command of a step to the next position and speed.
-    In the step in which it turns, it is followed to its reversal and from there.
-    """
-    (p, q, r), (s, t, o) = step.tolist()
-    z, v = still, 0.0
-    positions, moving = [z], [False]
-    for command in between.tolist():
-        ahead = command - z if v == 0.0 else v
-        if v or abs(ahead) > force:
-            driven = command - (force if ahead > 0.0 else -force)
-            further, faster = p * z + q * v + r * driven, s * z + t * v + o * driven
-            if faster * v < 0.0:
-                until = v / (v - faster) / FINE
-                further = z + 0.5 * v * until
-                pull, rest, faster = command - further, 1.0 / FINE - until, 0.0
-                if abs(pull) > force:
-                    faster = (pull - (force if pull > 0.0 else -force)) / inertia * rest
-                    further += 0.5 * faster * rest
-            z, v = further, faster
-        positions.append(z)
-        moving.append(v != 0.0)
-    return np.array(positions), np.array(moving)
 
 
 def pushed(forces: _Real, denominator: _Real) -> _Real:

@@ -8,9 +8,9 @@ import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.model import STRUCTURES, prepare_input
-from hmpim.model.fine import FINE, finely
-from hmpim.model.operators import play, stick_slip
-from hmpim.model.operators import rubbed as with_friction
+from hmpim.model.fine import FINE
+from hmpim.model.nonlinear import NonlinearPart
+from hmpim.model.operators import play
 from tests_support import in_studies
 
 FS, DELAY, OMEGA, ZETA = 200.0, 0.03, 2 * np.pi * 10.0, 0.4
@@ -139,33 +139,6 @@ def test_what_no_row_stands_for_stays_doubtful():
     assert not any(w.message.startswith("The model includes") for w in pair.warnings)
 
 
-def test_sticking_and_slipping_as_by_an_integrator_with_events():
-    """A unit that is pulled away, passes a reversal, and sticks again."""
-    force, inertia, damping = 0.1, 1.0, 0.3
-    rates = np.array([[0.0, 1.0, 0.0], [-1.0 / inertia, -damping, 1.0 / inertia], [0, 0, 0]])
-    step = scipy.linalg.expm(rates / FINE)[:2]
-    n = 40 * FINE
-    time = np.arange(n + 1) / FINE
-    command = 0.5 * np.sin(0.4 * time)
-    between = 0.5 * (command[:-1] + command[1:])
-    positions, moves = stick_slip(step, between, 0.0, force, inertia)
-    y = v = 0.0
-    fine, reference = 200, []
-    for k in range(n):
-        reference.append(y)
-        for i in range(fine):
-            pull = command[k] + (command[k + 1] - command[k]) * i / fine - y
-            if v == 0.0 and abs(pull) <= force:
-                continue
-            way = v if v != 0.0 else pull
-            rate = (pull - np.copysign(force, way)) / inertia - damping * v
-            faster = v + rate / (FINE * fine)
-            v = 0.0 if faster * v < 0.0 else faster
-            y += v / (FINE * fine)
-    assert np.max(np.abs(positions[:-1] - reference)) < 2e-3
-    assert 0.3 < np.mean(moves) < 1.0
-
-
 @pytest.mark.parametrize("begins", [None, 0])
 def test_the_linear_part_between_the_samples(begins):
     """It is the response of the model to the input between its samples."""
@@ -194,14 +167,14 @@ def test_a_standard_deviation_beyond_which_the_model_is_unstable_is_no_step_of_a
     t = np.arange(1200) / 100.0
     u = 5.0 * np.sin(2 * np.pi * (0.5 + 0.001 * t) * t)
     slow = 0.4 * np.pi  # 20 Hz, per sample
-    y, _, _ = with_friction(
-        finely(u, "bandlimited"),
-        delay=0.8,
-        denominator=np.array([1.0, 1.4 / slow, slow**-2]),
-        gain=1.0,
-        force=0.005,
+    unit = hmpim.Model(
+        delay=0.008,
+        scale_factor=1.0,
+        denominator=(slow**-2 / 100.0**2, 1.4 / slow / 100.0, 1.0),
+        nonlinear=NonlinearPart(kind="friction", at="force", size=0.005, std=0.0, reach=5.0),
     )
-    y = y[::FINE] + 0.0005 * np.random.default_rng(76).standard_normal(t.size)
+    y = hmpim.simulate(unit, u, fs=100.0, intersample="bandlimited")
+    y += 0.0005 * np.random.default_rng(76).standard_normal(t.size)
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)).pairs[0]
     assert pair.nonlinear_part is not None
     assert np.isfinite(pair.nonlinear_part.std)

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from hmpim.model import Chain
 from hmpim.model.fine import FINE
 from hmpim.model.nonlinear import force_step
-from hmpim.model.operators import command_step
-from hmpim.model.stepped import SteppedPart
+from hmpim.model.stepped import SteppedPart, command_step
 
 __all__ = ["c_number", "chain_context", "literal", "rendered"]
 

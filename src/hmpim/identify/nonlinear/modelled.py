@@ -172,10 +172,12 @@ def leaves_noise(joint: JointFit, one: Nonlinearity) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(joint: JointFit, one: Nonlinearity, between: Intersample) -> tuple[Modelled, Real]:
+def described(
+    joint: JointFit, one: Nonlinearity, between: Intersample, fs: float
+) -> tuple[Modelled, Real]:
     """The nonlinearity as the fit with its row, the last of its rows, has it.
 
-    `between` is what the row took the command to do between its samples.
+    `between` is what the row took the command to do between its samples, at `fs` in Hz.
 
     The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
     its derivatives are instruments, and those of the model include how the row moves (Söderström
@@ -202,7 +204,15 @@ def described(joint: JointFit, one: Nonlinearity, between: Intersample) -> tuple
     if waits is not None:
         waits[: max(one.begins, joint.forgotten)] = False
     std = float(np.sqrt(own[-1, -1]))
-    part = NonlinearPart(kind=kind, at=one.at, size=size, std=std, reach=one.reach, between=between)
+    part = NonlinearPart(
+        kind=kind,
+        at=one.at,
+        size=size,
+        std=std,
+        reach=one.reach,
+        between=between,
+        lag=one.lag / fs,
+    )
     found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits, part=part)
     return found, np.asarray(own[:-1, :-1])
 
@@ -216,7 +226,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
     out = np.zeros((vector.size, problem.y.size))
-    if one.kind == "friction" and fit.structure.name != "second_order":
+    if one.kind == "friction" and one.structure != fit.structure.name:
         return out
 
     def effect(at: Real) -> Real:

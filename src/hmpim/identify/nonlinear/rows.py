@@ -7,8 +7,8 @@ the input, 1/A the dynamics:
 backlash               play(x) - x: half the gap down and up while the output moves; while it waits
                        at a reversal, its samples do not count
 dead_zone              -G clip(u): nothing happens within half its width
-friction               the unit stepped in time with a constant force against its motion, less that
-                       without; while it sticks, its samples do not count
+friction               a constant force against the motion, in a unit of second or third order
+                       (`hmpim.model.friction`); while it sticks, its samples do not count
 hardening, softening   -(1/A) z³: a spring force beyond proportion, or below
 asymmetry              -(1/A) z², or x²: more one way than the other
 curvature              x³: a scale that changes with the deflection
@@ -28,14 +28,19 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
 from hmpim.identify.worth import MATERIAL, PART
+from hmpim.model.dynamics import StructureName
 from hmpim.model.fine import FINE, finely, sampled
+from hmpim.model.friction import Rubbing, rubbed
 from hmpim.model.nonlinear import Place
-from hmpim.model.operators import gap_crossed, play, power_of, pushed, rubbed
+from hmpim.model.operators import gap_crossed, play, power_of, pushed
 from hmpim.model.response import per_step
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["TURNS", "Command", "Nonlinearity", "dead_zone", "first_rows", "with_row"]
+
+_Lag = Callable[[Fit], float]
+"""Lag of the force behind the command, in samples, by a fit."""
 
 TURNS = 12
 """Turns after which a row that still changes is given up."""
@@ -61,6 +66,8 @@ class Nonlinearity:
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
     at: Place = "output"  # where it acts
     reach: float = 0.0  # largest deflection that it was made for; of a dead zone, largest command
+    structure: StructureName | None = None  # of friction: the dynamics in which it acts
+    lag: float = 0.0  # of friction: between the command and the force, in samples
 
 
 def with_row(problem: Problem, one: Nonlinearity) -> Problem:
@@ -79,11 +86,11 @@ def first_rows(
         largest = float(np.max(np.abs(linear_part(problem, start))))
         tried = [_waiting(problem, start, gap * largest) for gap in GAPS]
         yield _likeliest(tried, problem, start)
-    elif kind == "friction" and start.structure.name == "second_order":
-        fine = finely(command.u, command.intersample)
+    elif kind == "friction":
         largest = float(np.max(np.abs(linear_part(problem, start))))
-        tried = [_rubbing(fine, problem, start, gap * largest) for gap in GAPS]
-        yield _likeliest(tried, problem, start)
+        for lag in _LAGS.get(start.structure.name, ()):
+            tried = [_rubbing(lag, problem, start, gap * largest) for gap in GAPS]
+            yield _likeliest(tried, problem, start)
     elif kind in ("hardening", "softening"):
         yield _forced(kind, problem, start, power=3)
     elif kind == "curvature":
@@ -166,31 +173,48 @@ def _waiting(problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     )
 
 
-def _rubbing(fine: Real, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
-    """Coulomb friction of a second-order unit, in the output's unit: at rest it holds the output.
+def _rubbing(lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
+    """Coulomb friction, in the output's unit: at rest it holds the output."""
+    fine = linear_part_finely(problem, fit)
+    unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
+    effect, moves = rubbed(fine, unit, force)
 
-    The unit is stepped in time, from rest, with friction and without.
-    """
-    held, free, moves = rubbed(
-        fine,
-        delay=fit.delay,
-        denominator=fit.denominator,
-        gain=float(fit.linear[0]),
-        force=force,
-    )
-
-    def again(_: Problem, fit: Fit) -> Nonlinearity:
-        return _rubbing(fine, problem, fit, abs(float(fit.nuisance[-1])))
+    def again(data: Problem, fit: Fit) -> Nonlinearity:
+        return _rubbing(lag, data, fit, abs(float(fit.nuisance[-1])))
 
     return Nonlinearity(
         kind="friction",
-        row=((held - free) / force)[::FINE],
+        row=effect[::FINE] / force,
         again=again,
         counts=moves[::FINE],
         size=force,
         at="force",
-        reach=_most(free),
+        reach=_most(fine),
+        structure=fit.structure.name,
+        lag=unit.lag,
     )
+
+
+def _no_lag(_: Fit) -> float:
+    """In a unit of second order the command is the force."""
+    return 0.0
+
+
+def _lag_of_servo(fit: Fit) -> float:
+    """Lag of the force within a loop without other damping: it delays damping and stiffness."""
+    return float(fit.denominator[3] / fit.denominator[2])
+
+
+def _lag_of_command(fit: Fit) -> float:
+    """Lag of the command in front of a second-order unit: the real pole."""
+    return float(np.exp(fit.theta[-1]))
+
+
+_LAGS: dict[StructureName, tuple[_Lag, ...]] = {
+    "second_order": (_no_lag,),
+    "third_order": (_lag_of_servo, _lag_of_command),
+}
+"""Lags between command and force that a structure may have."""
 
 
 def _forced(
