@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import fit, started
 from hmpim.identify.fitting.course import completed, turn_ahead
-from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
@@ -24,6 +25,7 @@ from hmpim.identify.nonlinear.modelled import (
     is_explained,
     kinds_in_question,
     leaves_noise,
+    linear_starts,
     settled_rows,
 )
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
@@ -31,7 +33,7 @@ from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import ROUNDING, WORTH
-from hmpim.record import Finding
+from hmpim.record import Finding, Intersample
 
 __all__ = ["looked_through", "model_nonlinearity", "possible_bends"]
 
@@ -83,7 +85,9 @@ def _add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outp
     Not for clipped or held outputs, and not together with a changing gain.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
-    if question.exact or fitted.gaining or is_explained(joint):
+    if question.exact or is_explained(joint):
+        return fitted
+    if fitted.gaining is not None and fitted.gaining.taken:
         return fitted
     if seen.saturation is not None or seen.hold is not None:
         return fitted
@@ -98,17 +102,25 @@ def _add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outp
         known = joint.problem.fixed().shape[0] - problem.fixed().shape[0]
         leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural)
-        for kind in kinds_in_question(command, problem, course.best, joint.best.fit):
-            for one in settled_rows(kind, command, problem, course.best):
-                if not _is_promising(one, problem, course.best, leading, joint.problem, 1 - known):
-                    continue
-                beside = _fitted_with(steady, seen, problem, one)
-                gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
-                if beside.related and leaves_noise(beside, one) and gain > most:
-                    kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
-                    bending, own = described(beside, one, course.natural, question.aligned.fs)
-                    lead = replace(other, fits=(kept,), bending=bending, covariances=(own,))
-                    most = gain
+        starts = linear_starts(problem, course.best, joint)
+        for kind in kinds_in_question(command, problem, starts, joint.best.fit):
+            promised = [
+                (_promise(one, problem, start, leading, joint.problem, 1 - known), one)
+                for start in starts
+                for one in settled_rows(kind, command, problem, start)
+            ]
+            promise, one = max(promised, key=itemgetter(0), default=(0.0, None))
+            if one is None or promise <= 0.0:
+                continue
+            beside = _fitted_with(steady, seen, problem, one)
+            gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
+            if beside.related and leaves_noise(beside, one, seen.rounding) and gain > most:
+                kept = without_rows(beside, slice(problem.fixed().shape[0] - 1, None))
+                bending, own = described(beside, one, course.natural, question.aligned.fs)
+                lead = replace(
+                    other, fits=(kept,), bending=bending, covariances=(own,), gaining=None
+                )
+                most = gain
     return lead
 
 
@@ -118,21 +130,34 @@ def _fitted_with(
     """Fit every structure with a row for a nonlinearity."""
     valid = question.output.valid if one.counts is None else question.output.valid & one.counts
     question = replace(question, output=replace(question.output, valid=valid))
-    course = turn_ahead(started(question, seen, with_row(problem, one).nuisance))
-    return chosen_of(completed(course), question.structures)
+    course = completed(turn_ahead(started(question, seen, with_row(problem, one).nuisance)))
+    if one.within is None:
+        return chosen_of(course, question.structures)
+    own = polished(course.problem, one.within)
+    joint = chosen_of(replace(course, fits=[*course.fits, own]), question.structures)
+    return _in_own_dynamics(joint, own, course.natural)
 
 
-def _is_promising(
+def _in_own_dynamics(joint: JointFit, own: Fit, between: Intersample) -> JointFit:
+    """The fit with the dynamics in which the row's friction acts; others that lead are rivals."""
+    if joint.best.fit.structure == own.structure:
+        return joint
+    if joint.best.intersample != between:
+        return replace(joint, related=False)
+    return replace(taking(joint, polished(joint.problem, own)), rivals=(joint.best,))
+
+
+def _promise(
     one: Nonlinearity, problem: Problem, plain: Fit, joint: JointFit, former: Problem, count: int
-) -> bool:
-    """Whether the row is worth its price with plain dynamics, or with those that lead."""
+) -> float:
+    """Gain of the row in Schwarz's criterion with plain dynamics, or with those that lead."""
     best = joint.best.fit
+    gains = []
     for before, begun in ((joint.problem, best), (problem, plain)):
         data = with_row(before, one)
         again = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, begun)))
-        if criterion_gain(again, count, best, former) > 0.0:
-            return True
-    return False
+        gains.append(criterion_gain(again, count, best, former))
+    return max(gains)
 
 
 def looked_through(

@@ -34,6 +34,9 @@ _AHEAD = 512
 
 _STEP = 1.0 / FINE
 
+_PARTS = 16
+"""Parts of a step, between which the motion is taken as straight."""
+
 _AT_REST = 1e-3
 """Speed below which a unit is at rest at the start, over its greatest."""
 
@@ -129,6 +132,8 @@ class _Unit:
         self.thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
         self.pull = self._pull(rubbing)
         self.moved = _powers(scipy.linalg.expm(self.rates * _STEP))
+        parts = np.arange(_PARTS + 1)[:, None, None] * _STEP / _PARTS
+        self.within = scipy.linalg.expm(self.rates * parts)
         self.fades = np.exp(-_STEP / self.lag) if self.lag else 0.0
         self.effect = np.zeros(x.size)
         self.moves = np.zeros(x.size, dtype=bool)
@@ -191,7 +196,7 @@ class _Unit:
         if abs(w) <= self.force:
             return self._stick(at + 1, w - (pull - z), z, 1.0 - share, state)
         state[-1] = np.copysign(self.force, w)
-        self._move(state, (1.0 - share) * _STEP)
+        self._move(state, 1.0 - share)
         return at + 1
 
     def _stick(self, at: int, excess: float, z: float, share: float, state: _Real) -> int:
@@ -222,7 +227,7 @@ class _Unit:
         state[:2] = z - x, -speed
         state[2:-1] = sign * self.force - thrust
         state[-1] = sign * self.force
-        self._move(state, (1.0 - passed) * _STEP)
+        self._move(state, 1.0 - passed)
         return at
 
     def _between(self, at: int, share: float) -> list[float]:
@@ -231,10 +236,11 @@ class _Unit:
         every = (self.x, self.speed, self.thrust, self.pull)
         return [float(known[at] + share * (known[after] - known[at])) for known in every]
 
-    def _move(self, state: _Real, time: float) -> None:
-        """Move the state, in place, by less than a step."""
-        rate = self.rates @ state
-        state += time * (rate + 0.5 * time * (self.rates @ rate))
+    def _move(self, state: _Real, share: float) -> None:
+        """Move the state, in place, by a share of a step."""
+        part = min(int(share * _PARTS), _PARTS - 1)
+        first, second = self.within[part : part + 2]
+        state[:] = (first + (share * _PARTS - part) * (second - first)) @ state
 
 
 def _powers(step: _Real) -> _Real:

@@ -32,7 +32,8 @@ from hmpim.identify.nonlinear.rows import (
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
-from hmpim.identify.worth import MATERIAL, PART
+from hmpim.identify.worth import MATERIAL, PART, TWICE
+from hmpim.model.dynamics import StructureName
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding, Intersample
 
@@ -42,9 +43,13 @@ __all__ = [
     "is_explained",
     "kinds_in_question",
     "leaves_noise",
+    "linear_starts",
     "modelled_finding",
     "settled_rows",
 ]
+
+_SERVO: StructureName = "third_order"
+"""Dynamics of a servo whose force lags behind its command: of the kinds, friction acts in it."""
 
 _FEWEST = 100
 """Samples that must count: many times the parameters of a model with plain dynamics."""
@@ -91,17 +96,35 @@ def is_explained(joint: JointFit) -> bool:
     return plain or fit.structure.sampled or joint.problem.y.size > LONGEST
 
 
-def kinds_in_question(command: Command, problem: Problem, plain: Fit, best: Fit) -> list[Kind]:
-    """Kinds that may explain the residual of a plain fit, the likeliest first.
+def linear_starts(problem: Problem, plain: Fit, joint: JointFit) -> list[Fit]:
+    """Linear fits to which a nonlinearity may be added: the plain one, and that of a servo.
 
-    None if the plain fit leaves white noise, or if poles explain what no nonlinearity can.
+    A servo's lag makes a third pole, which a plain fit takes for delay.
     """
-    if problem.counted < _FEWEST or plain.is_white or best.cost < PART**2 * plain.cost:
+    trials = [trial.fit for trial in joint.trials if trial.fit.structure.name == _SERVO]
+    if plain.is_white or not trials:
+        return [plain]
+    servo = min(trials, key=lambda fit: fit.objective)
+    return [plain, fit_structure(problem, servo.structure, servo.theta)]
+
+
+def kinds_in_question(
+    command: Command, problem: Problem, starts: list[Fit], best: Fit
+) -> list[Kind]:
+    """Kinds that may explain the residual of one of the linear fits, the likeliest first.
+
+    None if the plain fit, the first, leaves white noise, or if poles explain what no nonlinearity
+    can.
+    """
+    least = min(fit.cost for fit in starts)
+    if problem.counted < _FEWEST or starts[0].is_white or best.cost < PART**2 * least:
         return []
-    found = bends(command.u, problem, plain, intersample=command.intersample, fs=1.0)
-    if not found or not found[0].certain:
-        return []
-    return list(dict.fromkeys(one.kind for one in found))
+    found: list[Kind] = []
+    for fit in starts:
+        seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
+        servo = fit.structure.name == _SERVO
+        found += [one.kind for one in seen if one.certain and (one.kind == "friction" or not servo)]
+    return list(dict.fromkeys(found))
 
 
 def settled_rows(
@@ -111,6 +134,8 @@ def settled_rows(
 
     The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
     """
+    if start.structure.name == _SERVO and kind != "friction":
+        return
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)
         if found is not None:
@@ -165,10 +190,15 @@ def _ahead(tried: list[Real], changes: list[Real]) -> Real:
     return np.asarray(last - weights @ (moves + differences))
 
 
-def leaves_noise(joint: JointFit, one: Nonlinearity) -> bool:
-    """Whether a fit leaves white noise, also at samples that do not depend on the linear part."""
+def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
+    """Whether a fit leaves white noise, also at samples that do not depend on the linear part.
+
+    Or a residual of which most is rounding error, `rounding` (r.m.s.): a slow motion colours it.
+    """
     problem, fit = joint.problem, joint.best.fit
     every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
+    if fit.cost < TWICE * problem.counted * rounding**2:
+        return True
     return fit.is_white and is_white(every)
 
 
@@ -226,7 +256,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
     out = np.zeros((vector.size, problem.y.size))
-    if one.kind == "friction" and one.structure != fit.structure.name:
+    if one.within is not None and one.within.structure != fit.structure:
         return out
 
     def effect(at: Real) -> Real:

@@ -66,7 +66,7 @@ class Nonlinearity:
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
     at: Place = "output"  # where it acts
     reach: float = 0.0  # largest deflection that it was made for; of a dead zone, largest command
-    structure: StructureName | None = None  # of friction: the dynamics in which it acts
+    within: Fit | None = None  # of friction: the dynamics in which it acts
     lag: float = 0.0  # of friction: between the command and the force, in samples
 
 
@@ -190,7 +190,7 @@ def _rubbing(lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearit
         size=force,
         at="force",
         reach=_most(fine),
-        structure=fit.structure.name,
+        within=fit,
         lag=unit.lag,
     )
 
