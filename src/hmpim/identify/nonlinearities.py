@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from operator import itemgetter
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
+from hmpim.identify.nonlinear.mechanisms import Kind
 from hmpim.identify.nonlinear.modelled import (
     described,
     is_explained,
@@ -104,13 +104,8 @@ def _add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outp
         command = Command(u=source.values, intersample=course.natural)
         starts = linear_starts(problem, course.best, joint)
         for kind in kinds_in_question(command, problem, starts, joint.best.fit):
-            promised = [
-                (_promise(one, problem, start, leading, joint.problem, 1 - known), one)
-                for start in starts
-                for one in settled_rows(kind, command, problem, start)
-            ]
-            promise, one = max(promised, key=itemgetter(0), default=(0.0, None))
-            if one is None or promise <= 0.0:
+            one = _likeliest(kind, command, problem, starts, leading, joint.problem, 1 - known)
+            if one is None:
                 continue
             beside = _fitted_with(steady, seen, problem, one)
             gain = criterion_gain(beside, 1 - known, joint.best.fit, joint.problem)
@@ -147,17 +142,36 @@ def _in_own_dynamics(joint: JointFit, own: Fit, between: Intersample) -> JointFi
     return replace(taking(joint, polished(joint.problem, own)), rivals=(joint.best,))
 
 
-def _promise(
-    one: Nonlinearity, problem: Problem, plain: Fit, joint: JointFit, former: Problem, count: int
-) -> float:
-    """Gain of the row in Schwarz's criterion with plain dynamics, or with those that lead."""
-    best = joint.best.fit
-    gains = []
-    for before, begun in ((joint.problem, best), (problem, plain)):
-        data = with_row(before, one)
-        again = replace(joint, problem=data, best=replace(joint.best, fit=refit(data, begun)))
-        gains.append(criterion_gain(again, count, best, former))
-    return max(gains)
+def _likeliest(
+    kind: Kind,
+    command: Command,
+    problem: Problem,
+    starts: list[Fit],
+    joint: JointFit,
+    former: Problem,
+    count: int,
+) -> Nonlinearity | None:
+    """The row of a kind that gains most in Schwarz's criterion, if any does.
+
+    With the dynamics of its start, or with those that lead. Further starts are tried only if none
+    so far leaves white noise.
+    """
+    best, most, found = joint.best.fit, 0.0, None
+    for start in starts:
+        white = False
+        for one in settled_rows(kind, command, problem, start):
+            for before, begun in ((problem, start), (joint.problem, best)):
+                fit = refit(with_row(before, one), begun)
+                again = replace(
+                    joint, problem=with_row(before, one), best=replace(joint.best, fit=fit)
+                )
+                gain = criterion_gain(again, count, best, former)
+                white = white or fit.is_white
+                if gain > most:
+                    most, found = gain, one
+        if white:
+            break
+    return found
 
 
 def looked_through(
