@@ -52,6 +52,7 @@ class Command:
 
     u: Real
     intersample: Intersample
+    others: Real | None = None  # (n,): what other inputs move the output by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -83,22 +84,22 @@ def first_rows(
 ) -> Iterator[Nonlinearity]:
     """Rows of a kind as the linear fit suggests them."""
     if kind == "backlash":
-        largest = float(np.max(np.abs(linear_part(problem, start))))
-        tried = [_waiting(problem, start, gap * largest) for gap in GAPS]
+        largest = _most(linear_part(problem, start, command.others))
+        tried = [_waiting(command, problem, start, gap * largest) for gap in GAPS]
         yield _likeliest(tried, problem, start)
     elif kind == "friction":
-        largest = float(np.max(np.abs(linear_part(problem, start))))
+        largest = _most(linear_part(problem, start, command.others))
         for lag in _LAGS.get(start.structure.name, ()):
-            tried = [_rubbing(lag, problem, start, gap * largest) for gap in GAPS]
+            tried = [_rubbing(command, lag, problem, start, gap * largest) for gap in GAPS]
             yield _likeliest(tried, problem, start)
     elif kind in ("hardening", "softening"):
-        yield _forced(kind, problem, start, power=3)
+        yield _forced(command, kind, problem, start, power=3)
     elif kind == "curvature":
-        yield _scaled(kind, problem, start, power=3)
+        yield _scaled(command, kind, problem, start, power=3)
     elif kind == "asymmetry":
-        yield _scaled(kind, problem, start, power=2)
+        yield _scaled(command, kind, problem, start, power=2)
         if start.structure.order:
-            yield _forced(kind, problem, start, power=2)
+            yield _forced(command, kind, problem, start, power=2)
 
 
 def _likeliest(tried: list[Nonlinearity], problem: Problem, fit: Fit) -> Nonlinearity:
@@ -151,16 +152,16 @@ def _through_model(u: Real, problem: Problem, fit: Fit) -> Real:
     return part.driven(fit.linear[:-1])
 
 
-def _waiting(problem: Problem, fit: Fit, half: float) -> Nonlinearity:
+def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     """Backlash of half a gap; while it waits the output does not depend on the input."""
-    fine = linear_part_finely(problem, fit)  # it turns between samples
+    fine = linear_part_finely(problem, fit, command.others)  # it turns between samples
     moved = ((play(fine, half) - fine) / half)[::FINE]
     counts = np.abs(np.abs(moved) - 1.0) < MATERIAL**2
     begins = int(np.count_nonzero(~gap_crossed(fine, half)[::FINE]))
     counts[:begins] = False
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _waiting(data, fit, abs(float(fit.nuisance[-1])))
+        return _waiting(command, data, fit, abs(float(fit.nuisance[-1])))
 
     return Nonlinearity(
         kind="backlash",
@@ -173,14 +174,14 @@ def _waiting(problem: Problem, fit: Fit, half: float) -> Nonlinearity:
     )
 
 
-def _rubbing(lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
+def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
     """Coulomb friction, in the output's unit: at rest it holds the output."""
-    fine = linear_part_finely(problem, fit)
+    fine = linear_part_finely(problem, fit, command.others)
     unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
     effect, moves = rubbed(fine, unit, force)
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _rubbing(lag, data, fit, abs(float(fit.nuisance[-1])))
+        return _rubbing(command, lag, data, fit, abs(float(fit.nuisance[-1])))
 
     return Nonlinearity(
         kind="friction",
@@ -218,33 +219,39 @@ _LAGS: dict[StructureName, tuple[_Lag, ...]] = {
 
 
 def _forced(
-    kind: Kind, data: Problem, fit: Fit, *, power: int, own: Real | None = None
+    command: Command,
+    kind: Kind,
+    data: Problem,
+    fit: Fit,
+    *,
+    power: int,
+    own: Real | None = None,
 ) -> Nonlinearity:
     """A force by a power of the output, over the linear one at the largest.
 
     It is followed on the finer clock, since its harmonics go beyond half the rate; `own` is the
     effect so far.
     """
-    z = linear_part_finely(data, fit)
+    z = linear_part_finely(data, fit, command.others)
     z = z if own is None else z + own
     largest = _most(z)
     fine = -pushed(power_of(z, power, largest), per_step(fit.denominator, FINE))
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _forced(kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
+        return _forced(command, kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
 
     return Nonlinearity(
         kind=kind, row=np.asarray(fine[::FINE]), again=again, at="force", reach=largest
     )
 
 
-def _scaled(kind: Kind, data: Problem, fit: Fit, *, power: int) -> Nonlinearity:
+def _scaled(command: Command, kind: Kind, data: Problem, fit: Fit, *, power: int) -> Nonlinearity:
     """A scale that changes with the deflection."""
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _scaled(kind, data, fit, power=power)
+        return _scaled(command, kind, data, fit, power=power)
 
-    x = linear_part(data, fit)
+    x = linear_part(data, fit, command.others)
     largest = _most(x)
     return Nonlinearity(kind=kind, row=power_of(x, power, largest), again=again, reach=largest)
 
