@@ -18,6 +18,8 @@ from hmpim.model.spread import Spread
 FS = 200.0
 T = np.arange(1200) / FS
 OMEGA, ZETA = 2 * np.pi * 6.0, 0.3
+LAG = 0.004
+"""Between the command and the force of a unit of third order, s."""
 UNIT = Model(
     delay=0.02,
     scale_factor=1.5,
@@ -84,6 +86,35 @@ def test_a_held_record_of_another_assumption_is_followed_as_such():
     held = replace(model, nonlinear=replace(model.nonlinear, between="zoh"), intersample="zoh")
     assert found.tolist() == simulate(held, u, fs=FS, intersample="zoh").tolist()
     assert np.sqrt(np.mean((found - exact) ** 2)) < 0.02
+
+
+@pytest.mark.parametrize("size", [0.1, 0.4])
+@pytest.mark.parametrize(
+    ("denominator", "lag"),
+    [
+        pytest.param(UNIT.denominator, 0.0, id="second order"),
+        pytest.param((LAG * OMEGA**-2, *UNIT.denominator), LAG, id="lag in the loop"),
+        pytest.param(tuple(np.polymul(UNIT.denominator, (LAG, 1.0))), LAG, id="lag of the command"),
+    ],
+)
+def test_friction_step_by_step_is_that_in_closed_form(denominator, lag, size):
+    rubs = part("friction", "force", size, lag=lag)
+    model, u = replace(UNIT, denominator=denominator, nonlinear=rubs), wave(T)
+    linear = replace(model, nonlinear=None)
+    closed, plain = (simulate(one, u, fs=FS, intersample="foh") for one in (model, linear))
+    effect = closed - plain
+    stepped = model.simulate(u, T) - linear.simulate(u, T)
+    assert np.std(stepped - effect) < 0.01 * np.std(effect)
+    assert np.std(effect) > 0.3 * size
+
+
+def test_friction_that_cannot_act_is_not_stepped():
+    rubs = part("friction", "force", 0.1, lag=LAG)
+    with pytest.raises(ArgumentError, match="it must be positive in a unit of third order, and 0"):
+        replace(UNIT, nonlinear=rubs).simulate(wave(T), T)
+    zero = replace(UNIT, numerator=(0.01, 1.0), nonlinear=part("friction", "force", 0.1))
+    with pytest.raises(ArgumentError, match="without zeros; the numerator here is of degree 1"):
+        zero.simulate(wave(T), T)
 
 
 def test_draws_have_sizes_of_their_own():

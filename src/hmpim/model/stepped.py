@@ -6,6 +6,7 @@ the samples by straight lines where a force or friction is followed on the finer
 """
 
 from dataclasses import dataclass, replace
+from math import copysign, exp
 
 import numpy as np
 import scipy
@@ -13,14 +14,18 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError
 from hmpim.model.fine import FINE, finely
+from hmpim.model.friction import Rubbing
 from hmpim.model.nonlinear import NonlinearPart, forced
 from hmpim.model.operators import play, power_of, rate_limited
 from hmpim.model.response import RationalDelay, per_step
 from hmpim.record import Intersample
 
-__all__ = ["SteppedPart", "command_step", "stepped_part"]
+__all__ = ["SteppedPart", "command_step", "kept", "stepped_part"]
 
 _Real = NDArray[np.float64]
+
+_State = tuple[float, float, float]
+"""Position, speed, and the force apart from friction, which only a unit with a lag remembers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,22 +75,29 @@ class SteppedPart:
             return forced(part, self.denominator, finely(x, "foh"))
         return part.weight * power_of(x, part.power, part.reach)
 
-    def _rubbed(self, fine: _Real) -> _Real:
-        """Effect of friction on a second-order unit, from rest: stepped with it and without."""
-        if self.denominator.size != 3:
+    @property
+    def rubbing(self) -> Rubbing:
+        """The dynamics within which friction acts.
+
+        Raises
+        ------
+        ArgumentError
+            If it cannot act in them.
+        """
+        if self.system.numerator.size != 1:
             raise ArgumentError(
-                "programs step friction within a second-order unit; the denominator here is of "
-                f"degree {self.denominator.size - 1}"
+                "friction acts within a unit without zeros; the numerator here is of degree "
+                f"{self.system.numerator.size - 1}"
             )
+        return Rubbing(denominator=self.denominator, lag=self.part.lag * self.fs)
+
+    def _rubbed(self, fine: _Real) -> _Real:
+        """Effect of friction, from rest: the unit stepped with it and without."""
         late, at = FINE * self.system.delay * self.fs, np.arange(fine.size)
         gain = float(self.system.numerator[0])
         command = gain * np.interp(at - late, at, fine, left=fine[0])
         between = 0.5 * (command[:-1] + command[1:])
-        step, still = command_step(self.denominator), command[0]
-        top, below = scipy.signal.ss2tf(step[:, :2], step[:, 2:], np.eye(1, 2), np.zeros((1, 1)))
-        free = scipy.signal.lfilter(top[0], below, np.append(between, command[-1]) - still) + still
-        held = stick_slip(step, between, still, self.part.size, float(self.denominator[2]))
-        return np.asarray((held - free)[::FINE])
+        return _stick_slip(self.rubbing, self.part.size, float(command[0]), between)[::FINE]
 
 
 def stepped_part(
@@ -113,38 +125,82 @@ def stepped_part(
     return SteppedPart(part=replace(part, between=straight), system=system, fs=fs)
 
 
-def command_step(denominator: _Real) -> _Real:
-    """Step of position and speed of a second-order unit on the finer clock, (2, 3).
+def command_step(unit: Rubbing) -> _Real:
+    """Step of a unit on the finer clock, (k, k + 1).
 
-    It multiplies position, speed and the command, which is held over the step.
+    It multiplies position, speed, in third order the force, and the command, which is held over
+    the step. A unit that slides moves so too, with force and command less by the friction.
     """
-    _, damping, inertia = denominator
-    rates = np.array([[0.0, 1.0, 0.0], [-1.0, -damping, 1.0], [0.0, 0.0, 0.0]])
-    rates[1] /= inertia
-    return np.asarray(scipy.linalg.expm(rates / FINE)[:2])
+    rates = unit.rates()
+    rates[:-1, -1] = -rates[:-1, 0]  # a command is a deflection the other way
+    return np.asarray(scipy.linalg.expm(rates / FINE)[:-1])
 
 
-def stick_slip(step: _Real, between: _Real, still: float, force: float, inertia: float) -> _Real:
-    """Output of a unit with friction, from rest at `still`.
+def kept(unit: Rubbing) -> float:
+    """Share of w - (command - z) that is left after a step of the finer clock, while stuck.
 
-    `step`, (2, 3), takes position, speed and the command of a step to the next position and speed.
-    In the step in which it turns, it is followed to its reversal and from there.
+    It is 0 in a second-order unit, whose force has no lag; w is the force apart from friction.
     """
-    (p, q, r), (s, t, o) = step.tolist()
-    z, v = still, 0.0
-    positions = [z]
+    return exp(-1.0 / (FINE * unit.lag)) if unit.lag else 0.0
+
+
+def _stick_slip(unit: Rubbing, force: float, still: float, between: _Real) -> _Real:
+    """What friction adds to the position of a unit, from rest at `still`, at each step."""
+    steps = _Steps(unit, force)
+    held = free = (still, 0.0, 0.0)
+    added = [0.0]
     for command in between.tolist():
-        ahead = command - z if v == 0.0 else v
-        if v or abs(ahead) > force:
-            driven = command - (force if ahead > 0.0 else -force)
-            further, faster = p * z + q * v + r * driven, s * z + t * v + o * driven
-            if faster * v < 0.0:
-                until = v / (v - faster) / FINE
-                further = z + 0.5 * v * until
-                pull, rest, faster = command - further, 1.0 / FINE - until, 0.0
-                if abs(pull) > force:
-                    faster = (pull - (force if pull > 0.0 else -force)) / inertia * rest
-                    further += 0.5 * faster * rest
-            z, v = further, faster
-        positions.append(z)
-    return np.array(positions)
+        held, free = steps.rubbed(held, command), steps.moved(free, command, 0.0)
+        added.append(held[0] - free[0])
+    return np.array(added)
+
+
+class _Steps:
+    """Steps of a unit on the finer clock, with friction and without."""
+
+    def __init__(self, unit: Rubbing, force: float) -> None:
+        self.unit, self.force, self.kept = unit, force, kept(unit)
+        step = command_step(unit)
+        order = step.shape[0]
+        rows = np.zeros((3, 4))  # a second-order unit has no force of its own
+        rows[:order, :order], rows[:order, 3] = step[:, :-1], step[:, -1]
+        self.rows = rows.tolist()
+
+    def moved(self, state: _State, command: float, friction: float) -> _State:
+        """The state after a step against a constant friction."""
+        z, v, w = state
+        w, driven = w - friction, command - friction
+        a, b, c = (p * z + q * v + r * w + s * driven for p, q, r, s in self.rows)
+        return a, b, c + friction
+
+    def rubbed(self, state: _State, command: float) -> _State:
+        """The state after a step with friction."""
+        z, v, w = state
+        if v == 0.0:
+            pull = command - z
+            w = w if self.unit.lag else pull
+            if abs(w) <= self.force:
+                return z, 0.0, pull + self.kept * (w - pull)
+        ahead = self.moved((z, v, w), command, copysign(self.force, v or w))
+        if ahead[1] * v < 0.0:
+            return self._turned(state, command, ahead)
+        return ahead
+
+    def _turned(self, state: _State, command: float, ahead: _State) -> _State:
+        """The state after a step in which the unit turns: it sticks, or is pulled back.
+
+        `ahead` is the state if friction did not turn with it.
+        """
+        z, v, w = state
+        share = v / (v - ahead[1])
+        until = share / FINE
+        rest = 1.0 / FINE - until
+        z += 0.5 * v * until
+        pull = command - z
+        w = w + share * (ahead[2] - w) if self.unit.lag else pull
+        if abs(w) <= self.force:
+            return z, 0.0, pull + self.kept ** (1.0 - share) * (w - pull)
+        friction = copysign(self.force, w)
+        v = (w - friction) / self.unit.inertia * rest
+        w += (1.0 - share) * (self.moved((z, 0.0, w), command, friction)[2] - w)
+        return z + 0.5 * v * rest, v, w

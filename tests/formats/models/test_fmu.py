@@ -64,19 +64,23 @@ def test_fmpy_gets_the_numbers_of_the_model(written):
     assert found["y"] == pytest.approx(truth, abs=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["backlash", "friction"])
-def test_fmpy_gets_the_numbers_of_a_model_that_is_not_linear(kind, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "at", "lag"),
+    [("backlash", "output", 0.0), ("friction", "force", 0.0), ("friction", "force", 0.004)],
+)
+def test_fmpy_gets_the_numbers_of_a_model_that_is_not_linear(kind, at, lag, tmp_path, monkeypatch):
     monkeypatch.setattr(fmu, "PLATFORMS", fmu.PLATFORMS[:1])
-    place = "force" if kind == "friction" else "output"
-    part = NonlinearPart(kind=kind, at=place, size=0.2, std=0.01, reach=5.0)
-    model, u = replace(SECOND, nonlinear=part), walk()
+    part = NonlinearPart(kind=kind, at=at, size=0.2, std=0.01, reach=5.0, lag=lag)
+    below = tuple(np.polymul(SECOND.denominator, (lag, 1.0) if lag else (1.0,)))
+    linear, u = replace(SECOND, denominator=below), walk()
+    model = replace(linear, nonlinear=part)
     (path,) = export(result_of(model), to="fmu", path=tmp_path / "axis.fmu")
     signal = np.array(list(zip(T, u, strict=True)), dtype=[("time", float), ("u", float)])
     found = fmpy.simulate_fmu(
         str(path), stop_time=T[-1], input=signal, output=["y"], output_interval=1 / FS
     )
     assert found["y"] == pytest.approx(model.simulate(u, T), abs=1e-6)
-    assert np.std(found["y"] - SECOND.simulate(u, T)) > 0.05
+    assert np.std(found["y"] - linear.simulate(u, T)) > 0.05
 
 
 BUILT_FOR = {

@@ -30,8 +30,17 @@ UNIT = Model(
 )
 
 
-def part(kind: str, at: str, size: float, reach: float = 2.0) -> NonlinearPart:
-    return NonlinearPart(kind=kind, at=at, size=size, std=0.01 * abs(size), reach=reach)
+LAG = 0.003
+"""Between the command and the force of a third-order unit, s."""
+
+THIRD = {
+    "friction_loop": (LAG * OMEGA**-2, *UNIT.denominator),  # the lag is within the loop
+    "friction_command": tuple(np.polymul(UNIT.denominator, (LAG, 1.0))),  # it is in front
+}
+
+
+def part(kind: str, at: str, size: float, reach: float = 2.0, lag: float = 0.0) -> NonlinearPart:
+    return NonlinearPart(kind=kind, at=at, size=size, std=0.01 * abs(size), reach=reach, lag=lag)
 
 
 PARTS = {
@@ -39,6 +48,8 @@ PARTS = {
     "dead_zone": part("dead_zone", "command", 0.08, 1.0),
     "rate_limit": part("rate_limit", "command", 50.0, 94.0),
     "friction": part("friction", "force", 0.05),
+    "friction_loop": part("friction", "force", 0.05, lag=LAG),
+    "friction_command": part("friction", "force", 0.3, lag=LAG),
     "hardening": part("hardening", "force", 0.1),
     "softening": part("softening", "force", 0.08),
     "asymmetry": part("asymmetry", "force", -0.05),
@@ -53,7 +64,8 @@ def wave(t: np.ndarray = T) -> np.ndarray:
 
 
 def model_with(name: str, **changes: object) -> Model:
-    return replace(UNIT, nonlinear=PARTS[name], **changes)
+    unit = replace(UNIT, denominator=THIRD.get(name, UNIT.denominator))
+    return replace(unit, nonlinear=PARTS[name], **changes)
 
 
 @pytest.mark.usefixtures("needs_cc")
@@ -128,6 +140,15 @@ def test_mujoco_rubs_as_predicted(step, within, tmp_path):
         for one in (model, replace(model, nonlinear=None))
     )
     assert np.std(y - truth) < within * np.std(truth - linear)
+
+
+@pytest.mark.parametrize("name", ["friction_loop", "friction_command"])
+def test_mujoco_omits_friction_behind_a_lag_of_the_force(name, tmp_path):
+    with pytest.warns(LinearPartOnly, match="it omits Coulomb friction"):
+        (file,) = export(
+            result_of(model_with(name)), to="mujoco", path=tmp_path / "a.xml", timestep=0.001
+        )
+    assert "frictionloss" not in file.read_text()
 
 
 @pytest.mark.parametrize("name", ["dead_zone", "curvature", "bent"])
@@ -214,15 +235,23 @@ def test_a_nonlinearity_that_was_found_and_is_no_part_of_the_model_is_said(targe
 
 
 def test_programs_say_how_near_they_are(tmp_path):
-    for name in ("dead_zone", "friction", "hardening"):
+    for name in ("dead_zone", "friction", "friction_loop", "hardening"):
         (file,) = export(result_of(model_with(name)), to="python", path=tmp_path / "m.py")
         said = re.search(r"within (\S+) of its effect \(r\.m\.s\.\)", heading(file))
         assert said is not None
         assert float(said[1]) < 0.05, name
 
 
-def test_friction_that_no_second_order_unit_has_is_left_out(tmp_path):
-    model = replace(UNIT, denominator=(0.02, 1.0), nonlinear=PARTS["friction"])
+@pytest.mark.parametrize(
+    ("denominator", "name"),
+    [
+        ((0.02, 1.0), "friction"),
+        (THIRD["friction_loop"], "friction"),
+        (UNIT.denominator, "friction_loop"),
+    ],
+)
+def test_friction_that_cannot_act_in_the_dynamics_is_left_out(denominator, name, tmp_path):
+    model = replace(UNIT, denominator=denominator, nonlinear=PARTS[name])
     with pytest.warns(LinearPartOnly, match="omits Coulomb friction"):
         (file,) = export(result_of(model), to="python", path=tmp_path / "m.py")
     linear = replace(model, nonlinear=None)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hmpim.model import Chain
 from hmpim.model.fine import FINE
 from hmpim.model.nonlinear import force_step
-from hmpim.model.stepped import SteppedPart, command_step
+from hmpim.model.stepped import SteppedPart, command_step, kept
 
 __all__ = ["c_number", "chain_context", "literal", "rendered"]
 
@@ -140,9 +140,12 @@ def _bent_context(stepped: SteppedPart) -> dict[str, Any]:
     if part.kind == "friction":
         late = stepped.system.delay * stepped.fs * FINE
         whole = floor(late)
+        unit = stepped.rubbing
         context |= {
-            "motion": command_step(stepped.denominator),
-            "inertia": float(stepped.denominator[2]),
+            "motion": command_step(unit),
+            "lag": unit.lag,
+            "kept": kept(unit),
+            "inertia": unit.inertia,
             "gain": float(stepped.system.numerator[0]),
             "whole": whole,
             "part": late - whole,
