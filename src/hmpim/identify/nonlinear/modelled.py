@@ -32,12 +32,13 @@ from hmpim.identify.nonlinear.rows import (
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
-from hmpim.identify.worth import MATERIAL, PART, TWICE
-from hmpim.model.dynamics import StructureName
+from hmpim.identify.worth import MATERIAL, MOST, PART, TWICE
+from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.nonlinear import NonlinearPart
-from hmpim.record import Finding, Intersample
+from hmpim.record import Finding
 
 __all__ = [
+    "ALIKE",
     "Modelled",
     "described",
     "is_explained",
@@ -50,6 +51,9 @@ __all__ = [
 
 _SERVO: StructureName = "third_order"
 """Dynamics of a servo whose force lags behind its command: of the kinds, friction acts in it."""
+
+ALIKE: tuple[Kind, ...] = ("backlash", "friction")
+"""Kinds whose traces are alike below the natural frequency, against a spring."""
 
 _FEWEST = 100
 """Samples that must count: many times the parameters of a model with plain dynamics."""
@@ -101,11 +105,18 @@ def linear_starts(problem: Problem, plain: Fit, joint: JointFit) -> list[Fit]:
 
     A servo's lag makes a third pole, which a plain fit takes for delay.
     """
-    trials = [trial.fit for trial in joint.trials if trial.fit.structure.name == _SERVO]
-    if plain.is_white or not trials:
+    if plain.is_white:
         return [plain]
-    servo = min(trials, key=lambda fit: fit.objective)
-    return [plain, fit_structure(problem, servo.structure, servo.theta)]
+    servo = STRUCTURES[_SERVO]
+    trials = [trial.fit for trial in joint.trials if trial.fit.structure == servo]
+    if trials:
+        start = min(trials, key=lambda fit: fit.objective).theta
+    elif plain.structure.name == "second_order" and plain.delay > 0.0:
+        start = np.append(plain.theta, np.log(MOST * plain.delay))
+        start[0] *= 1.0 - MOST
+    else:
+        return [plain]
+    return [plain, fit_structure(problem, servo, start)]
 
 
 def kinds_in_question(
@@ -123,7 +134,7 @@ def kinds_in_question(
     for fit in starts:
         seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
         servo = fit.structure.name == _SERVO
-        found += [one.kind for one in seen if one.certain and (one.kind == "friction" or not servo)]
+        found += [one.kind for one in seen if one.certain and (one.kind in ALIKE or not servo)]
     return list(dict.fromkeys(found))
 
 
@@ -139,11 +150,11 @@ def settled_rows(
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)
         if found is not None:
-            yield found
+            yield replace(found, between=command.intersample)
     for one in first_rows(kind, command, problem, start):
         found = _in_turns(one, problem, start)
         if found is not None:
-            yield found
+            yield replace(found, between=command.intersample)
 
 
 def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity | None:
@@ -156,7 +167,8 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
     at = np.append(start.theta, one.size / scale)
     tried: list[Real] = []
     changes: list[Real] = []
-    nearest, least = None, PART
+    nearest, least, last = None, PART, np.inf
+    ever: Mask | None = None  # samples that have counted since the fit was last no nearer
     for _ in range(TURNS):
         data = with_row(problem, one)
         if data.counted < _FEWEST:
@@ -168,6 +180,11 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
             nearest, least = one, deviance
         if least < MATERIAL:
             break
+        if deviance > last:  # samples that wait come and go
+            tried.clear()
+            changes.clear()
+            ever = one.counts
+        last = deviance
         tried.append(at)
         changes.append(np.append(fit.theta, fit.nuisance[-1] / scale) - at)
         at = _ahead(tried, changes)
@@ -176,6 +193,9 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
         there = fit_structure(data, structure, at[:-1], iterations=0)
         sizes = np.append(there.nuisance[:-1], at[-1] * scale)
         one = one.again(data, replace(there, nuisance=sizes))
+        if ever is not None and one.counts is not None:
+            one = replace(one, counts=one.counts & ever)
+            ever = one.counts
     return nearest
 
 
@@ -202,12 +222,8 @@ def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(
-    joint: JointFit, one: Nonlinearity, between: Intersample, fs: float
-) -> tuple[Modelled, Real]:
-    """The nonlinearity as the fit with its row, the last of its rows, has it.
-
-    `between` is what the row took the command to do between its samples, at `fs` in Hz.
+def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, Real]:
+    """The nonlinearity as the fit with its row, the last of its rows, has it, at `fs` in Hz.
 
     The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
     its derivatives are instruments, and those of the model include how the row moves (Söderström
@@ -240,7 +256,7 @@ def described(
         size=size,
         std=std,
         reach=one.reach,
-        between=between,
+        between=one.between,
         lag=one.lag / fs,
     )
     found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits, part=part)

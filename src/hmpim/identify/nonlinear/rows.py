@@ -67,6 +67,7 @@ class Nonlinearity:
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
     at: Place = "output"  # where it acts
     reach: float = 0.0  # largest deflection that it was made for; of a dead zone, largest command
+    between: Intersample = "bandlimited"  # what it took the command to do between its samples
     within: Fit | None = None  # of friction: the dynamics in which it acts
     lag: float = 0.0  # of friction: between the command and the force, in samples
 

@@ -1,0 +1,231 @@
+"""A nonlinearity in the fit of an output: its row, sought with one input and added to all."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import CLEARLY
+from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.coupling.pairs import contribution
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
+from hmpim.identify.effects.imperfections import Imperfections
+from hmpim.identify.fits import fit, started
+from hmpim.identify.fitting.course import completed, turn_ahead
+from hmpim.identify.fitting.data import polished, refit
+from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.joint import chosen_of
+from hmpim.identify.fitting.plainer import taking
+from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.nonlinear.mechanisms import Kind
+from hmpim.identify.nonlinear.modelled import (
+    ALIKE,
+    described,
+    is_explained,
+    kinds_in_question,
+    leaves_noise,
+    linear_starts,
+    settled_rows,
+)
+from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
+from hmpim.identify.preparation.question import Question
+from hmpim.record import Intersample
+
+__all__ = ["add_row", "add_row_of_leading"]
+
+
+def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
+    """Add a row for backlash, a dead zone, friction, a spring or a bent scale if it leaves noise.
+
+    Not for clipped or held outputs, and not together with a changing gain.
+    """
+    lead, most = fitted, 2 * CLEARLY
+    for gain, one, beside, other in _with_rows(question, seen, fitted, None):
+        if gain > most and leaves_noise(beside, one, seen.rounding):
+            bending, own = described(beside, one, question.aligned.fs)
+            lead = replace(
+                other,
+                fits=(without_rows(beside, slice(-1, None)),),
+                bending=bending,
+                covariances=(own,),
+                gaining=None,
+            )
+            most = gain
+    return lead
+
+
+def add_row_of_leading(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
+    """Add a row for a nonlinearity of the input that moves the output most, of several.
+
+    It is sought with that input alone, next to the motion by the others; all are fitted again to
+    the output without it, since couplings may have imitated it.
+    """
+    i = fitted.leading
+    joint, output = fitted.fits[i], question.output
+    others = _moved_by_others(fitted, i)
+    (source,) = question.aligned.inputs[i : i + 1]
+    alone = replace(
+        question,
+        inputs=None,
+        aligned=replace(question.aligned, inputs=(source,)),
+        output=replace(output, values=output.values - others),
+    )
+    first = replace(fitted, fits=(joint,), covariances=(), asked=0)
+    found = max(_with_rows(alone, seen, first, others), key=lambda one: one[0], default=None)
+    if found is None or found[0] <= 2 * CLEARLY:
+        return fitted
+    _, one, beside, _ = found
+    trend = beside.best.fit.nuisance[-1] * one.row
+    valid = output.valid if one.counts is None else output.valid & one.counts
+    straight = replace(question, output=replace(output, values=output.values - trend, valid=valid))
+    _, again = fit(straight, seen)
+    if not again.fits[i].related:
+        return fitted
+    joined, row = _joined(again, i, one, trend)
+    rows = joined.problem.fixed().shape[0] - joint.problem.fixed().shape[0]
+    gain = criterion_gain(joined, rows, joint.best.fit, joint.problem)
+    if gain <= 2 * CLEARLY or not leaves_noise(joined, row, seen.rounding):
+        return fitted
+    bending, own = described(_known_besides(joined, again, i), row, question.aligned.fs)
+    fits, covariances = list(again.fits), list(again.covariances)
+    fits[i], covariances[i] = without_rows(joined, slice(-1, None)), own
+    return replace(again, fits=tuple(fits), covariances=tuple(covariances), bending=bending)
+
+
+def _moved_by_others(fitted: OutputFit, i: int) -> Real:
+    """What all inputs but one move the output by, (n,)."""
+    parts = (contribution(one) for j, one in enumerate(fitted.fits) if j != i and one.related)
+    return np.asarray(sum(parts, np.zeros(fitted.fits[i].problem.y.size)))
+
+
+def _joined(
+    fitted: OutputFit, i: int, one: Nonlinearity, trend: Real
+) -> tuple[JointFit, Nonlinearity]:
+    """The leading fit with the row, which is computed once more with this fit, and the row."""
+    joint = fitted.fits[i]
+    problem, best = replace(joint.problem, y=joint.problem.y + trend), joint.best.fit
+    own = best if one.within is None else one.within
+    start = best if best.structure == own.structure else own
+    data = with_row(problem, one)
+    row = replace(one.again(data, polished(data, start)), between=one.between)
+    data = with_row(problem, row)
+    found = polished(data, start)
+    trial = replace(joint.best, fit=found)
+    rivals = joint.rivals if start is best else (joint.best,)
+    return replace(
+        joint, problem=data, weighed=data, best=trial, trials=(trial,), rivals=rivals
+    ), row
+
+
+def _known_besides(joint: JointFit, fitted: OutputFit, i: int) -> JointFit:
+    """The fit with the derivatives of all other inputs' fits as rows, so that all are free."""
+    every = [one for j, one in enumerate(fitted.fits) if j != i and one.related]
+    if not every:
+        return joint
+    plain = [replace(one.problem, valid=None, nuisance=None, begins=None) for one in every]
+    moves = [
+        jacobian(problem, one.best.fit)[:-1] for problem, one in zip(plain, every, strict=True)
+    ]
+    known, fit = joint.problem.fixed()[1:], joint.best.fit
+    rows = np.vstack([*moves, known])
+    weights = np.concatenate([np.zeros(rows.shape[0] - known.shape[0]), fit.nuisance])
+    problem = replace(joint.problem, nuisance=rows)
+    best = replace(joint.best, fit=replace(fit, nuisance=weights))
+    return replace(joint, problem=problem, weighed=problem, best=best)
+
+
+def _with_rows(
+    question: Question, seen: Imperfections, fitted: OutputFit, others: Real | None
+) -> Iterator[tuple[float, Nonlinearity, JointFit, OutputFit]]:
+    """Gain in Schwarz's criterion by each kind's row, the row, its fit, and the former one.
+
+    The former fit is without a drift that the row replaces. `others`, (n,), is what other inputs
+    move the output by; the output of `question` is without it.
+    """
+    joint, source = fitted.fits[0], question.aligned.inputs[0]
+    if question.exact or is_explained(joint):
+        return
+    if fitted.gaining is not None and fitted.gaining.taken:
+        return
+    if seen.saturation is not None or seen.hold is not None:
+        return
+    attempts = [(fitted, joint.problem.y, joint.problem.nuisance)]
+    if fitted.drifting is not None and fitted.humming is None:  # the drift may have imitated it
+        attempts.append((replace(fitted, drifting=None), question.output.values, None))
+    for other, y, rows in attempts:
+        steady = replace(question, output=replace(question.output, values=y))
+        course = completed(turn_ahead(started(steady, seen, rows)))
+        problem = course.problem
+        count = 1 - (joint.problem.fixed().shape[0] - problem.fixed().shape[0])
+        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
+        command = Command(u=source.values, intersample=course.natural, others=others)
+        starts = linear_starts(problem, course.best, joint)
+        kinds = kinds_in_question(command, problem, starts, joint.best.fit)
+        while kinds:
+            kind = kinds.pop(0)
+            one = _likeliest(kind, command, problem, starts, leading, joint.problem, count)
+            beside = None if one is None else _fitted_with(steady, seen, problem, one)
+            if one is not None and beside is not None and beside.related:
+                gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
+                yield gain, one, beside, other
+                if leaves_noise(beside, one, seen.rounding):
+                    continue
+            if kind == ALIKE[0] and ALIKE[1] not in kinds:
+                kinds.append(ALIKE[1])
+
+
+def _fitted_with(
+    question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
+) -> JointFit:
+    """Fit every structure with a row for a nonlinearity."""
+    valid = question.output.valid if one.counts is None else question.output.valid & one.counts
+    question = replace(question, output=replace(question.output, valid=valid))
+    course = completed(turn_ahead(started(question, seen, with_row(problem, one).nuisance)))
+    if one.within is None:
+        return chosen_of(course, question.structures)
+    own = polished(course.problem, one.within)
+    joint = chosen_of(replace(course, fits=[*course.fits, own]), question.structures)
+    return _in_own_dynamics(joint, own, course.natural)
+
+
+def _in_own_dynamics(joint: JointFit, own: Fit, between: Intersample) -> JointFit:
+    """The fit with the dynamics in which the row's friction acts; others that lead are rivals."""
+    if joint.best.fit.structure == own.structure:
+        return joint
+    if joint.best.intersample != between:
+        return replace(joint, related=False)
+    return replace(taking(joint, polished(joint.problem, own)), rivals=(joint.best,))
+
+
+def _likeliest(
+    kind: Kind,
+    command: Command,
+    problem: Problem,
+    starts: list[Fit],
+    joint: JointFit,
+    former: Problem,
+    count: int,
+) -> Nonlinearity | None:
+    """The row of a kind that gains most in Schwarz's criterion, if any does.
+
+    With the dynamics of its start, or with those that lead. Further starts are tried only if none
+    so far leaves white noise.
+    """
+    best, most, found = joint.best.fit, 0.0, None
+    for start in starts:
+        white = False
+        for one in settled_rows(kind, command, problem, start):
+            for before, begun in ((problem, start), (joint.problem, best)):
+                fit = refit(with_row(before, one), begun)
+                again = replace(
+                    joint, problem=with_row(before, one), best=replace(joint.best, fit=fit)
+                )
+                gain = criterion_gain(again, count, best, former)
+                white = white or fit.is_white
+                if gain > most:
+                    most, found = gain, one
+        if white:
+            break
+    return found
