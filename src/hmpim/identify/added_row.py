@@ -210,14 +210,15 @@ def _likeliest(
 ) -> Nonlinearity | None:
     """The row of a kind that gains most in Schwarz's criterion, if any does.
 
-    With the dynamics of its start, or with those that lead. Further starts are tried only if none
-    so far leaves white noise.
+    With the dynamics of its start, or, unless it acts within these, with those that lead. Further
+    starts are tried only if none so far leaves white noise.
     """
     best, most, found = joint.best.fit, 0.0, None
     for start in starts:
         white = False
         for one in settled_rows(kind, command, problem, start):
-            for before, begun in ((problem, start), (joint.problem, best)):
+            leading = [(joint.problem, best)] if one.within is None else []
+            for before, begun in [(problem, start), *leading]:
                 fit = refit(with_row(before, one), begun)
                 again = replace(
                     joint, problem=with_row(before, one), best=replace(joint.best, fit=fit)
