@@ -24,8 +24,8 @@ _NEAR = 24
 class Misfit:
     """How much of the residual still follows the input."""
 
-    # of the residual's in-band power, explained by a smooth response to the input beyond what
-    # noise would explain; 0 when none
+    # of the residual's power, at all frequencies, explained by a smooth response to the input
+    # within its band beyond what noise would explain; 0 when none
     share: float
     probability: float  # chance of so much, or more, if the model were right
 
@@ -49,8 +49,9 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
     spectra, delays = _transform(residual, bins)[None], np.array([delay])
     found = misfits(stimulus[:bins], spectra, samples=u.size, delays=delays, band=band)
-    share, probability = (float(values[0]) for values in found)
-    return Misfit(share=share, probability=probability)
+    followed, probability = (float(values[0]) for values in found)
+    total = 0.5 * u.size * float(residual @ residual)  # of the bins above 0
+    return Misfit(share=min(followed / total, 1.0) if total else 0.0, probability=probability)
 
 
 def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
@@ -67,7 +68,8 @@ def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misf
     window = np.ones(2 * _NEAR + 1)
     if not 0 < count < PART * moved.size or moved.size < window.size:
         return None
-    power = windowed_power(residual)[inside]
+    whole = windowed_power(residual)
+    power = whole[inside]
     others = np.convolve(np.where(moved, 0.0, power), window, mode="same")
     room = np.convolve(~moved, window, mode="same")
     if not np.all((others[moved] > 0.0) & (room[moved] >= _NEAR // 2)):
@@ -76,7 +78,7 @@ def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misf
     ratio = float(np.mean(power[moved] / noise))
     above = float(np.sum(power[moved] - noise))
     return Misfit(
-        share=max(above, 0.0) / float(power.sum()),
+        share=max(above, 0.0) / float(whole.sum()),
         probability=float(scipy.special.fdtrc(count, float(room[moved].min()), ratio)),
     )
 
@@ -90,7 +92,7 @@ def _transform(residual: Real, bins: int) -> Complex:
 def misfits(
     stimulus: Complex, residuals: Complex, *, samples: int, delays: Real, band: tuple[float, float]
 ) -> tuple[Real, Real]:
-    """Test many residuals of one input as `misfit` does one; shares and probabilities, (k,).
+    """Test many residuals of one input as `misfit` does one: followed power, probability, (k,).
 
     `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
     residuals, and `delays`, (k,), are in samples.
@@ -102,11 +104,11 @@ def misfits(
         return np.zeros(delays.size), np.ones(delays.size)
     noise = (total - taken) / (width - 1)
     noisy = np.all(noise > 0, axis=1)
-    noise, total = np.where(noisy[:, None], noise, 1.0), np.where(noisy[:, None], total, 1.0)
+    noise = np.where(noisy[:, None], noise, 1.0)
     # Fisher's sum over groups: each ratio is F(2, 2 width - 2), with a tail in closed form.
     tail = (1.0 + taken / noise / (width - 1)) ** (-(width - 1.0))
     statistic = -2.0 * np.sum(np.log(np.maximum(tail, 1e-300)), axis=1)
-    beyond = np.sum(taken - noise, axis=1) / np.sum(total, axis=1)
+    beyond = np.sum(taken - noise, axis=1)
     return (
         np.where(noisy, np.maximum(beyond, 0.0), 0.0),
         np.where(noisy, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
