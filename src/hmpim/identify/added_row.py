@@ -105,18 +105,17 @@ def _joined(
 ) -> tuple[JointFit, Nonlinearity]:
     """The leading fit with the row, which is computed once more with this fit, and the row."""
     joint = fitted.fits[i]
-    problem, best = replace(joint.problem, y=joint.problem.y + trend), joint.best.fit
+    former, best = joint.best, joint.best.fit
+    problem = replace(joint.problem, y=joint.problem.y + trend)
     own = best if one.within is None else one.within
     start = best if best.structure == own.structure else own
     data = with_row(problem, one)
     row = replace(one.again(data, polished(data, start)), between=one.between)
     data = with_row(problem, row)
     found = polished(data, start)
-    trial = replace(joint.best, fit=found)
-    rivals = joint.rivals if start is best else (joint.best,)
-    return replace(
-        joint, problem=data, weighed=data, best=trial, trials=(trial,), rivals=rivals
-    ), row
+    trial = replace(former, fit=found)
+    joint = replace(joint, problem=data, weighed=data, best=trial, trials=(trial,))
+    return joint if start is best else replace(joint, rivals=(former,), hidden=None), row
 
 
 def _known_besides(joint: JointFit, fitted: OutputFit, i: int) -> JointFit:
