@@ -34,8 +34,11 @@ _AHEAD = 512
 
 _STEP = 1.0 / FINE
 
-_PARTS = 16
-"""Parts of a step, between which the motion is taken as straight."""
+_PARTS = 256
+"""Parts of a step, to which a reversal is known."""
+
+_FEWEST = 32
+"""Steps that are at least computed at once."""
 
 _AT_REST = 1e-3
 """Speed below which a unit is at rest at the start, over its greatest."""
@@ -123,20 +126,25 @@ def rubbed(x: _Real, rubbing: Rubbing, force: float) -> tuple[_Real, NDArray[np.
 
 
 class _Unit:
-    """A unit with friction, followed from one reversal to the next."""
+    """A unit with friction, followed from one reversal to the next.
+
+    Its state is that of z - x, and the friction, at a step.
+    """
 
     def __init__(self, x: _Real, rubbing: Rubbing, force: float) -> None:
         self.x, self.force, self.lag = x, force, rubbing.lag
-        self.rates = rubbing.rates()
+        self.last = x.size - 1
+        rates = rubbing.rates()
         self.speed = np.gradient(x, _STEP)
         self.thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
         self.pull = self._pull(rubbing)
-        self.moved = _powers(scipy.linalg.expm(self.rates * _STEP))
-        parts = np.arange(_PARTS + 1)[:, None, None] * _STEP / _PARTS
-        self.within = scipy.linalg.expm(self.rates * parts)
+        self.within = _powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS)
+        self.moved = _powers(self.within[_PARTS], _AHEAD)
+        self.shifts, self.speeds = (np.ascontiguousarray(self.moved[:, k]) for k in (0, 1))
         self.fades = np.exp(-_STEP / self.lag) if self.lag else 0.0
+        self.usual = _AHEAD  # steps from one reversal to the next, roughly
         self.effect = np.zeros(x.size)
-        self.moves = np.zeros(x.size, dtype=bool)
+        self.moves = np.ones(x.size, dtype=bool)
 
     def _pull(self, rubbing: Rubbing) -> _Real:
         """W while the unit sticks, plus its deflection, (m,), once the lag is over."""
@@ -151,105 +159,109 @@ class _Unit:
 
     def follow(self) -> tuple[_Real, NDArray[np.bool_]]:
         """The effect, and where the unit moves."""
-        state = np.zeros(self.rates.shape[0])
+        state = np.zeros(self.moved.shape[1])
         if abs(self.speed[0]) <= _AT_REST * float(np.max(np.abs(self.speed))):
-            at = self._stick(0, 0.0, float(self.x[0]), 0.0, state)
+            at, state = self._stick(0, 0.0, float(self.x[0]), 0.0, state)
         else:
             state[-1], at = np.copysign(self.force, self.speed[0]), 0
-        while at < self.x.size - 1:
-            at = self._slide(at, state)
-        if at < self.x.size:
-            self.effect[-1], self.moves[-1] = state[0], True
+        while at < self.last:
+            at, state = self._slide(at, state)
+        if at == self.last:
+            self.effect[at] = state[0]
         return self.effect, self.moves
 
-    def _slide(self, at: int, state: _Real) -> int:
-        """Follow the unit to its next reversal and from there; `state` is changed in place.
-
-        The first and the last value are steps at which the state is known.
-        """
-        most, sign = self.x.size - 1, np.sign(state[-1])
+    def _slide(self, at: int, state: _Real) -> tuple[int, _Real]:
+        """Follow the unit to its next reversal and from there."""
+        forward, begun = state.item(-1) > 0.0, at
         while True:
-            ahead = min(_AHEAD, most - at)
-            speeds = self.moved[1 : ahead + 1, 1] @ state + self.speed[at + 1 : at + 1 + ahead]
-            back = speeds * sign < 0.0
-            turn = int(back.argmax())
-            found = bool(back[turn])
+            ahead = min(self.usual, self.last - at)
+            speeds = self.speeds[1 : ahead + 1] @ state
+            speeds += self.speed[at + 1 : at + 1 + ahead]
+            back = speeds < 0.0 if forward else speeds > 0.0
+            turn = back.argmax().item()
+            found = back.item(turn)
             passed = turn if found else ahead
-            self.effect[at : at + passed + 1] = self.moved[: passed + 1, 0] @ state
-            self.moves[at : at + passed + 1] = True
-            state[:] = self.moved[passed] @ state
+            np.matmul(self.shifts[: passed + 1], state, out=self.effect[at : at + passed + 1])
+            state = self.moved[passed] @ state
             at += passed
             if found:
-                return self._turn(at, state, float(speeds[turn]))
-            if at == most:
-                return at
+                self.usual = min(max(2 * (at - begun), _FEWEST), _AHEAD)
+                return self._turn(at, state, speeds.item(turn))
+            if at == self.last:
+                return at, state
+            self.usual = min(2 * self.usual, _AHEAD)
 
-    def _turn(self, at: int, state: _Real, beyond: float) -> int:
+    def _turn(self, at: int, state: _Real, beyond: float) -> tuple[int, _Real]:
         """Slide back or stick after a reversal within the next step; `beyond` is the speed then."""
-        now = float(self.speed[at] + state[1])
+        now = self.speed.item(at) + state.item(1)
         share = now / (now - beyond) if now * beyond < 0.0 else 0.0
-        state += share * (self.moved[1] @ state - state)
-        x, speed, thrust, pull = self._between(at, share)
+        state = self._later(state, share)
+        x, speed, thrust, pull = (
+            known.item(at) + share * (known.item(at + 1) - known.item(at))
+            for known in (self.x, self.speed, self.thrust, self.pull)
+        )
         state[1] = -speed
-        z = x + float(state[0])
-        w = thrust + float(state[2]) if self.lag else pull - z
+        z = x + state.item(0)
+        w = thrust + state.item(2) if self.lag else pull - z
         if abs(w) <= self.force:
             return self._stick(at + 1, w - (pull - z), z, 1.0 - share, state)
-        state[-1] = np.copysign(self.force, w)
-        self._move(state, 1.0 - share)
-        return at + 1
+        state[-1] = self.force if w > 0.0 else -self.force
+        return at + 1, self._later(state, 1.0 - share)
 
-    def _stick(self, at: int, excess: float, z: float, share: float, state: _Real) -> int:
+    def _stick(
+        self, at: int, excess: float, z: float, share: float, state: _Real
+    ) -> tuple[int, _Real]:
         """Hold the unit at z until w exceeds the friction.
 
         `excess` is w beyond what it tends to, `share` the part of a step that has passed since.
         """
-        first, ahead = at, _AHEAD // 4
+        first, ahead = at, _FEWEST
         while True:
             ahead = min(2 * ahead, self.x.size - at)
             w = self.pull[at : at + ahead] - z
             if excess:
                 w += excess * self.fades ** (at - first + share + np.arange(ahead))
             beyond = np.abs(w) > self.force
-            k = int(beyond.argmax())
-            if beyond[k]:
+            k = beyond.argmax().item()
+            if beyond.item(k):
                 break
             at += ahead
             if at == self.x.size:
-                self.effect[first:] = z - self.x[first:]
-                return at
+                self._hold(first, at, z)
+                return at, state
         at += k
-        self.effect[first:at] = z - self.x[first:at]
-        before = float(w[k - 1]) if k else self.force
-        passed = (self.force - abs(before)) / (abs(float(w[k])) - abs(before)) if k else 1.0
-        x, speed, thrust, _ = self._between(at - 1 if k else at, passed if k else 0.0)
-        sign = np.sign(w[k])
+        self._hold(first, at, z)
+        now, before = w.item(k), w.item(k - 1) if k else self.force
+        passed = (self.force - abs(before)) / (abs(now) - abs(before)) if k else 1.0
+        x, speed, thrust = (
+            known.item(at)
+            if passed == 1.0
+            else known.item(at - 1) + passed * (known.item(at) - known.item(at - 1))
+            for known in (self.x, self.speed, self.thrust)
+        )
+        force = self.force if now > 0.0 else -self.force
         state[:2] = z - x, -speed
-        state[2:-1] = sign * self.force - thrust
-        state[-1] = sign * self.force
-        self._move(state, 1.0 - passed)
-        return at
+        state[2:-1] = force - thrust
+        state[-1] = force
+        return at, self._later(state, 1.0 - passed)
 
-    def _between(self, at: int, share: float) -> list[float]:
-        """x, speed, thrust and pull between a step and the next."""
-        after = min(at + 1, self.x.size - 1)
-        every = (self.x, self.speed, self.thrust, self.pull)
-        return [float(known[at] + share * (known[after] - known[at])) for known in every]
+    def _hold(self, first: int, last: int, z: float) -> None:
+        """The unit at z from one step to before another one."""
+        self.effect[first:last] = z - self.x[first:last]
+        self.moves[first:last] = False
 
-    def _move(self, state: _Real, share: float) -> None:
-        """Move the state, in place, by a share of a step."""
-        part = min(int(share * _PARTS), _PARTS - 1)
-        first, second = self.within[part : part + 2]
-        state[:] = (first + (share * _PARTS - part) * (second - first)) @ state
+    def _later(self, state: _Real, share: float) -> _Real:
+        """The state after a share of a step."""
+        return np.asarray(self.within[round(share * _PARTS)] @ state)
 
 
-def _powers(step: _Real) -> _Real:
-    """Powers of a matrix from 0 to `_AHEAD`, (_AHEAD + 1, k, k)."""
-    out = np.empty((_AHEAD + 1, *step.shape))
+def _powers(step: _Real, most: int) -> _Real:
+    """Powers of a matrix from 0 to `most`, a power of two: (most + 1, k, k)."""
+    out = np.empty((most + 1, *step.shape))
     out[0] = np.eye(step.shape[0])
     out[1] = step
     known = 1
-    while known < _AHEAD:
+    while known < most:
         out[known + 1 : 2 * known + 1] = out[1 : known + 1] @ out[known]
         known *= 2
     return out
