@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit, started
+from hmpim.identify.fits import fit, fit_once, started
 from hmpim.identify.fitting.course import completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -33,7 +34,10 @@ from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.preparation.question import Question
 from hmpim.record import Intersample
 
-__all__ = ["add_row", "add_row_of_leading"]
+__all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
+
+_Found = tuple[float, Nonlinearity, JointFit, OutputFit]
+"""Gain in Schwarz's criterion by a row, the row, the fit with it, and the fit without it."""
 
 
 def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
@@ -56,38 +60,74 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
     return lead
 
 
+def fit_with_row(question: Question, seen: Imperfections) -> OutputFit | None:
+    """Fit all inputs with a nonlinearity of the leading one, if that leaves noise at once.
+
+    Plain dynamics that leave noise with it end the search, as they do with a drift: richer ones,
+    couplings and drifts would only imitate it. None otherwise.
+    """
+    led = fit_once(question, seen, question.plain, leading_only=True)
+    i, joint = led.asked, led.fits[0]
+    if not joint.related:
+        return None
+    others = question.output.values - joint.problem.y
+    alone = _alone(question, i, others)
+    found = _likeliest_of(_with_rows(alone, seen, OutputFit(fits=(joint,)), others))
+    if found is None or not leaves_noise(found[2], found[1], seen.rounding):
+        return None
+    return _with_all(question, seen, i, found, joint)
+
+
 def add_row_of_leading(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
     """Add a row for a nonlinearity of the input that moves the output most, of several.
 
-    It is sought with that input alone, next to the motion by the others; all are fitted again to
-    the output without it, since couplings may have imitated it.
+    It is sought with that input alone, next to the motion by the others.
     """
     i = fitted.leading
-    joint, output = fitted.fits[i], question.output
-    others = _moved_by_others(fitted, i)
-    (source,) = question.aligned.inputs[i : i + 1]
-    alone = replace(
+    joint, others = fitted.fits[i], _moved_by_others(fitted, i)
+    first = replace(fitted, fits=(joint,), covariances=(), asked=0)
+    found = _likeliest_of(_with_rows(_alone(question, i, others), seen, first, others))
+    if found is None:
+        return fitted
+    return _with_all(question, seen, i, found, joint) or fitted
+
+
+def _alone(question: Question, i: int, others: Real) -> Question:
+    """The same question with one input, of an output without the motion by the others."""
+    output = question.output
+    return replace(
         question,
         inputs=None,
-        aligned=replace(question.aligned, inputs=(source,)),
+        aligned=replace(question.aligned, inputs=question.aligned.inputs[i : i + 1]),
         output=replace(output, values=output.values - others),
     )
-    first = replace(fitted, fits=(joint,), covariances=(), asked=0)
-    found = max(_with_rows(alone, seen, first, others), key=lambda one: one[0], default=None)
-    if found is None or found[0] <= 2 * CLEARLY:
-        return fitted
+
+
+def _likeliest_of(found: Iterator[_Found]) -> _Found | None:
+    """The row that gains most, if it is worth its price."""
+    best = max(found, key=itemgetter(0), default=None)
+    return None if best is None or best[0] <= 2 * CLEARLY else best
+
+
+def _with_all(
+    question: Question, seen: Imperfections, i: int, found: _Found, former: JointFit
+) -> OutputFit | None:
+    """Fit all inputs to the output without the effect of a row, which is then computed again.
+
+    None unless that leaves noise, and is likelier than the fit without the row, `former`.
+    """
     _, one, beside, _ = found
-    trend = beside.best.fit.nuisance[-1] * one.row
+    output, trend = question.output, beside.best.fit.nuisance[-1] * one.row
     valid = output.valid if one.counts is None else output.valid & one.counts
     straight = replace(question, output=replace(output, values=output.values - trend, valid=valid))
     _, again = fit(straight, seen)
     if not again.fits[i].related:
-        return fitted
+        return None
     joined, row = _joined(again, i, one, trend)
-    rows = joined.problem.fixed().shape[0] - joint.problem.fixed().shape[0]
-    gain = criterion_gain(joined, rows, joint.best.fit, joint.problem)
+    rows = joined.problem.fixed().shape[0] - former.problem.fixed().shape[0]
+    gain = criterion_gain(joined, rows, former.best.fit, former.problem)
     if gain <= 2 * CLEARLY or not leaves_noise(joined, row, seen.rounding):
-        return fitted
+        return None
     bending, own = described(_known_besides(joined, again, i), row, question.aligned.fs)
     fits, covariances = list(again.fits), list(again.covariances)
     fits[i], covariances[i] = without_rows(joined, slice(-1, None)), own
@@ -137,11 +177,10 @@ def _known_besides(joint: JointFit, fitted: OutputFit, i: int) -> JointFit:
 
 def _with_rows(
     question: Question, seen: Imperfections, fitted: OutputFit, others: Real | None
-) -> Iterator[tuple[float, Nonlinearity, JointFit, OutputFit]]:
-    """Gain in Schwarz's criterion by each kind's row, the row, its fit, and the former one.
+) -> Iterator[_Found]:
+    """Fit each kind's row; the fit without it is also without a drift that the row replaces.
 
-    The former fit is without a drift that the row replaces. `others`, (n,), is what other inputs
-    move the output by; the output of `question` is without it.
+    `others`, (n,), is what other inputs move the output by; the output of `question` is without it.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     if question.exact or is_explained(joint):

@@ -9,10 +9,9 @@ from typing import Literal
 
 from hmpim.arguments import checked
 from hmpim.identify.coupling.responses import inputs_of
-from hmpim.identify.fits import fit
 from hmpim.identify.judgement import judged
 from hmpim.identify.kept import keeping
-from hmpim.identify.nonlinearities import model_nonlinearity
+from hmpim.identify.nonlinearities import fit_output, model_nonlinearity
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.preparation.clocks import settled_between
 from hmpim.identify.preparation.question import Question, recognise_software
@@ -169,12 +168,12 @@ def identify_output(question: Question) -> Described:
         return describe_dead(question)
     question = recognise_software(mark_swapped(question))
     seen = look(question)
-    seen, fitted = fit(question, seen)
+    seen, fitted = fit_output(question, seen)
     for _ in range(LOOKS):
         before, seen = seen, look_again(question, seen, fitted)
         if not seen.counts_other_samples_than(before):
             break
-        seen, fitted = fit(question, seen)
+        seen, fitted = fit_output(question, seen)
     fitted = let_gain_change(question, seen, fitted)
     question, fitted = model_nonlinearity(question, seen, fitted)
     fitted = through_reference(question, fitted)

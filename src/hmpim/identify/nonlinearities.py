@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from hmpim.identify.added_row import add_row, add_row_of_leading
+from hmpim.identify.added_row import add_row, add_row_of_leading, fit_with_row
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import fit
@@ -21,7 +21,24 @@ from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import ROUNDING, WORTH
 from hmpim.record import Finding
 
-__all__ = ["looked_through", "model_nonlinearity", "possible_bends"]
+__all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends"]
+
+
+def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
+    """Fit an output as `hmpim.identify.fits.fit`; with several inputs, first with a nonlinearity.
+
+    The levels found are returned with the fit.
+    """
+    if len(question.aligned.inputs) > 1 and _may_bend(question):
+        bent = fit_with_row(question, seen)
+        if bent is not None:
+            return seen, bent
+    return fit(question, seen)
+
+
+def _may_bend(question: Question) -> bool:
+    """Whether a nonlinearity is looked for: not in loops and software."""
+    return not (question.linear or question.instrument or question.swapped)
 
 
 def model_nonlinearity(
@@ -32,9 +49,9 @@ def model_nonlinearity(
     Only of an input that the output follows; a speed limit, of the only input. Not for loops and
     software.
     """
-    if not fitted.fits[fitted.leading].related or question.instrument or question.swapped:
+    if fitted.bending is not None or not _may_bend(question):
         return question, fitted
-    if question.linear:
+    if not fitted.fits[fitted.leading].related:
         return question, fitted
     if len(fitted.fits) > 1:
         return question, add_row_of_leading(question, seen, fitted)

@@ -124,7 +124,7 @@ def fit_together(
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the leading input and its plain fit, and its value is
     returned unless it is None. If `leading_only`, only strong inputs are fitted, with plain
-    dynamics, and only the leading input's fit is returned.
+    dynamics, and only the leading input's fit is returned; `asked` is its place.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -136,7 +136,7 @@ def fit_together(
     _join(inputs, pairs, plainly)
     if leading_only:
         pairs.refine(pairs.kept, None)
-        return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
+        return OutputFit(fits=(pairs.fits[pairs.strong[0]],), asked=pairs.strong[0])
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
         drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
