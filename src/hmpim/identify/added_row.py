@@ -12,7 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit, fit_once, started
+from hmpim.identify.fits import fit, lead, started
 from hmpim.identify.fitting.course import completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -25,6 +25,7 @@ from hmpim.identify.nonlinear.modelled import (
     ALIKE,
     described,
     is_explained,
+    is_noise,
     kinds_in_question,
     leaves_noise,
     linear_starts,
@@ -32,6 +33,7 @@ from hmpim.identify.nonlinear.modelled import (
 )
 from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.preparation.question import Question
+from hmpim.identify.worth import FEW
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
@@ -66,13 +68,12 @@ def fit_with_row(question: Question, seen: Imperfections) -> OutputFit | None:
     Plain dynamics that leave noise with it end the search, as they do with a drift: richer ones,
     couplings and drifts would only imitate it. None otherwise.
     """
-    led = fit_once(question, seen, question.plain, leading_only=True)
-    i, joint = led.asked, led.fits[0]
-    if not joint.related:
-        return None
-    others = question.output.values - joint.problem.y
-    alone = _alone(question, i, others)
-    found = _likeliest_of(_with_rows(alone, seen, OutputFit(fits=(joint,)), others))
+    i, joint = lead(question, seen)
+    if not joint.related or joint.best.fit.cost > FEW**2 * joint.problem.spread:
+        return None  # others move it too
+    none = np.zeros(joint.problem.y.size)
+    alone = _alone(question, i, none)
+    found = _likeliest_of(_with_rows(alone, seen, OutputFit(fits=(joint,)), none))
     if found is None or not leaves_noise(found[2], found[1], seen.rounding):
         return None
     return _with_all(question, seen, i, found, joint)
@@ -203,7 +204,9 @@ def _with_rows(
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
         while kinds:
             kind = kinds.pop(0)
-            one = _likeliest(kind, command, problem, starts, leading, joint.problem, count)
+            one = _likeliest(
+                kind, command, problem, starts, leading, joint.problem, count, seen.rounding
+            )
             beside = None if one is None else _fitted_with(steady, seen, problem, one)
             if one is not None and beside is not None and beside.related:
                 gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
@@ -245,26 +248,27 @@ def _likeliest(
     joint: JointFit,
     former: Problem,
     count: int,
+    rounding: float,
 ) -> Nonlinearity | None:
     """The row of a kind that gains most in Schwarz's criterion, if any does.
 
-    With the dynamics of its start, or, unless it acts within these, with those that lead. Further
-    starts are tried only if none so far leaves white noise.
+    With the dynamics of its start, or, unless it acts within these, with those that lead. Of
+    friction, no other lag is tried once it leaves noise; no further start once the noise is white.
     """
-    best, most, found = joint.best.fit, 0.0, None
+    best, most, found, white = joint.best.fit, 0.0, None, False
     for start in starts:
-        white = False
         for one in settled_rows(kind, command, problem, start):
             leading = [(joint.problem, best)] if one.within is None else []
             for before, begun in [(problem, start), *leading]:
-                fit = refit(with_row(before, one), begun)
-                again = replace(
-                    joint, problem=with_row(before, one), best=replace(joint.best, fit=fit)
-                )
+                data = with_row(before, one)
+                fit = refit(data, begun)
+                again = replace(joint, problem=data, best=replace(joint.best, fit=fit))
                 gain = criterion_gain(again, count, best, former)
                 white = white or fit.is_white
                 if gain > most:
                     most, found = gain, one
+            if one.within is not None and is_noise(data, fit, rounding):
+                break
         if white:
             break
     return found

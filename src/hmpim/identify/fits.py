@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.output_fit import OutputFit, fit_in_motion, fit_together
+from hmpim.identify.coupling.output_fit import OutputFit, fit_in_motion, fit_leading, fit_together
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
@@ -28,7 +28,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows
-from hmpim.identify.fitting.joint import chosen_of
+from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -39,7 +39,7 @@ from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 
-__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "started"]
+__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "lead", "started"]
 
 _CLEAR = 8
 """Bins between a constant and a line: in the window's spectrum each is four wide on either side."""
@@ -318,6 +318,19 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
+
+
+def lead(question: Question, seen: Imperfections) -> tuple[int, JointFit]:
+    """Plain fit of the input that the output follows most, and its place."""
+    fitted = partial(
+        joint_fit,
+        known=question.measured,
+        intersample=question.intersample,
+        structures=question.plain,
+        growing=False,
+    )
+    inputs, output = [source.values for source in question.aligned.inputs], question.output
+    return fit_leading(inputs, output.values, valid=counted_in(question, seen), fitted=fitted)
 
 
 def fit_once(

@@ -43,7 +43,7 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "fit_in_motion", "fit_together"]
+__all__ = ["OutputFit", "fit_in_motion", "fit_leading", "fit_together"]
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -124,7 +124,7 @@ def fit_together(
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the leading input and its plain fit, and its value is
     returned unless it is None. If `leading_only`, only strong inputs are fitted, with plain
-    dynamics, and only the leading input's fit is returned; `asked` is its place.
+    dynamics, and only the leading input's fit is returned.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -136,7 +136,7 @@ def fit_together(
     _join(inputs, pairs, plainly)
     if leading_only:
         pairs.refine(pairs.kept, None)
-        return OutputFit(fits=(pairs.fits[pairs.strong[0]],), asked=pairs.strong[0])
+        return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
         drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
@@ -161,6 +161,15 @@ def fit_together(
     if pairs.demote():
         _fit_couplings(inputs, pairs, plain)
     return _moved_at_once(pairs)
+
+
+def fit_leading(
+    inputs: list[Real], y: Real, *, valid: Mask | None, fitted: Callable[..., JointFit]
+) -> tuple[int, JointFit]:
+    """Fit the input that an output, (n,), follows most, and its place; others count as noise."""
+    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=(), excluded={})
+    _lead(inputs, pairs, fitted)
+    return pairs.strong[0], pairs.fits[pairs.strong[0]]
 
 
 def fit_in_motion(

@@ -42,6 +42,7 @@ __all__ = [
     "Modelled",
     "described",
     "is_explained",
+    "is_noise",
     "kinds_in_question",
     "leaves_noise",
     "linear_starts",
@@ -210,15 +211,22 @@ def _ahead(tried: list[Real], changes: list[Real]) -> Real:
     return np.asarray(last - weights @ (moves + differences))
 
 
-def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
-    """Whether a fit leaves white noise, also at samples that do not depend on the linear part.
+def is_noise(problem: Problem, fit: Fit, rounding: float) -> bool:
+    """Whether a residual is white, or mostly rounding error, of which `rounding` is the r.m.s."""
+    return is_rounding(problem, fit, rounding) or fit.is_white
 
-    Or a residual of which most is rounding error, `rounding` (r.m.s.): a slow motion colours it.
-    """
+
+def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
+    """Whether most of a residual is rounding error, which a slow motion colours."""
+    return fit.cost < TWICE * problem.counted * rounding**2
+
+
+def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
+    """Whether a fit leaves noise, also at samples that do not depend on the linear part."""
     problem, fit = joint.problem, joint.best.fit
-    every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
-    if fit.cost < TWICE * problem.counted * rounding**2:
+    if is_rounding(problem, fit, rounding):
         return True
+    every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
     return fit.is_white and is_white(every)
 
 

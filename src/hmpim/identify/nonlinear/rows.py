@@ -42,6 +42,12 @@ __all__ = ["TURNS", "Command", "Nonlinearity", "dead_zone", "first_rows", "with_
 _Lag = Callable[[Fit], float]
 """Lag of the force behind the command, in samples, by a fit."""
 
+_GUESSES = 2
+"""Rows from which the size of friction is guessed, each from that of the former."""
+
+_SURELY = 0.1
+"""Share of friction by which it may be larger where a unit surely moves."""
+
 TURNS = 12
 """Turns after which a row that still changes is given up."""
 
@@ -89,10 +95,10 @@ def first_rows(
         tried = [_waiting(command, problem, start, gap * largest) for gap in GAPS]
         yield _likeliest(tried, problem, start)
     elif kind == "friction":
-        largest = _most(linear_part(problem, start, command.others))
         for lag in _LAGS.get(start.structure.name, ()):
-            tried = [_rubbing(command, lag, problem, start, gap * largest) for gap in GAPS]
-            yield _likeliest(tried, problem, start)
+            first = _first_friction(command, lag, problem, start)
+            if first is not None:
+                yield first
     elif kind in ("hardening", "softening"):
         yield _forced(command, kind, problem, start, power=3)
     elif kind == "curvature":
@@ -105,11 +111,15 @@ def first_rows(
 
 def _likeliest(tried: list[Nonlinearity], problem: Problem, fit: Fit) -> Nonlinearity:
     """The row that explains most of the residual together with a linear change of the model."""
+    along, power = _regressed(tried, problem, fit)
+    return tried[int(np.argmax(np.maximum(along, 0.0) ** 2 / power))]
+
+
+def _regressed(tried: list[Nonlinearity], problem: Problem, fit: Fit) -> tuple[Real, Real]:
+    """Products with the residual, and powers, of what no linear change of the model explains."""
     rows = problem.plain.masked(np.stack([one.row for one in tried]))
     own = without(rows, jacobian(problem.plain, fit))
-    along = np.maximum(own @ fit.residual, 0.0)
-    gains = along**2 / np.maximum(np.vecdot(own, own), np.finfo(float).tiny)
-    return tried[int(np.argmax(gains))]
+    return own @ fit.residual, np.maximum(np.vecdot(own, own), np.finfo(float).tiny)
 
 
 def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | None:
@@ -176,10 +186,14 @@ def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> Nonli
 
 
 def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
-    """Coulomb friction, in the output's unit: at rest it holds the output."""
+    """Coulomb friction, in the output's unit: at rest it holds the output.
+
+    Samples count that would move with a little more friction as well: others may come and go.
+    """
     fine = linear_part_finely(problem, fit, command.others)
     unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
     effect, moves = rubbed(fine, unit, force)
+    moves &= rubbed(fine, unit, (1.0 + _SURELY) * force)[1]
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _rubbing(command, lag, data, fit, abs(float(fit.nuisance[-1])))
@@ -195,6 +209,18 @@ def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: flo
         within=fit,
         lag=unit.lag,
     )
+
+
+def _first_friction(command: Command, lag: _Lag, problem: Problem, fit: Fit) -> Nonlinearity | None:
+    """Friction of the size by which its row explains the residual; None if against the motion."""
+    size = GAPS[0] * _most(linear_part(problem, fit, command.others))
+    for _ in range(_GUESSES):
+        one = _rubbing(command, lag, problem, fit, size)
+        along, power = _regressed([one], problem, fit)
+        size = float(along[0] / power[0])
+        if size <= 0.0:
+            return None
+    return _rubbing(command, lag, problem, fit, size)
 
 
 def _no_lag(_: Fit) -> float:
