@@ -166,8 +166,9 @@ def _measured(
     record = rig.play(case, stimuli, np.random.default_rng(seed))
     save_recording(record, raw, stimuli=stimuli, rig=f"{plan.name}: {case.id}")
     try:
-        # Levels are compared: friction counts as it acts at each of them.
-        found = identify(record, nonlinear="reported")
+        # Where levels are compared, friction counts as it acts at each of them.
+        levels = next(test.levels for test in plan.tests if test.name == case.test)
+        found = identify(record, nonlinear="reported" if len(levels) > 1 else "modelled")
     except HmpimError as error:  # a dead encoder, for instance: say where
         raise type(error)(f"case {case.id}: {error}") from error
     pairs = [
