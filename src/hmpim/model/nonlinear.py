@@ -260,13 +260,8 @@ def friction(part: NonlinearPart, system: RationalDelay, source: SampledInput, f
     ------
     ArgumentError
         If the dynamics are not those of a unit of second or third order that returns to its
-        command, without zeros.
+        command.
     """
-    if system.numerator.size != 1:
-        raise ArgumentError(
-            "friction acts within a unit without zeros; the numerator here is of degree "
-            f"{system.numerator.size - 1}"
-        )
     below = per_step(system.denominator, fs)
     unit = Rubbing(denominator=below / (below[0] or 1.0), lag=part.lag * fs)
     effect, _ = rubbed(_driven_finely(system, source, fs), unit, part.size)

@@ -50,7 +50,7 @@ __all__ = [
     "settled_rows",
 ]
 
-_SERVO: StructureName = "third_order"
+_SERVOS: tuple[StructureName, ...] = ("third_order", "third_order_zeros")
 """Dynamics of a servo whose force lags behind its command: of the kinds, friction acts in it."""
 
 ALIKE: tuple[Kind, ...] = ("backlash", "friction")
@@ -102,22 +102,25 @@ def is_explained(joint: JointFit) -> bool:
 
 
 def linear_starts(problem: Problem, plain: Fit, joint: JointFit) -> list[Fit]:
-    """Linear fits to which a nonlinearity may be added: the plain one, and that of a servo.
+    """Linear fits to which a nonlinearity may be added: the plain one, and those of a servo.
 
-    A servo's lag makes a third pole, which a plain fit takes for delay.
+    A servo's lag makes a third pole, which a plain fit takes for delay, and commands of velocity
+    and acceleration make zeros.
     """
     if plain.is_white:
         return [plain]
-    servo = STRUCTURES[_SERVO]
-    trials = [trial.fit for trial in joint.trials if trial.fit.structure == servo]
-    if trials:
-        start = min(trials, key=lambda fit: fit.objective).theta
-    elif plain.structure.name == "second_order" and plain.delay > 0.0:
+    starts = {}
+    if plain.structure.name == "second_order" and plain.delay > 0.0:
         start = np.append(plain.theta, np.log(MOST * plain.delay))
         start[0] *= 1.0 - MOST
-    else:
-        return [plain]
-    return [plain, fit_structure(problem, servo, start)]
+        starts[_SERVOS[0]] = start
+    for trial in sorted(joint.trials, key=lambda trial: -trial.fit.objective):
+        if trial.fit.structure.name in _SERVOS:
+            starts[trial.fit.structure.name] = trial.fit.theta
+    servos = [
+        fit_structure(problem, STRUCTURES[name], starts[name]) for name in _SERVOS if name in starts
+    ]
+    return [plain, *servos]
 
 
 def kinds_in_question(
@@ -134,7 +137,7 @@ def kinds_in_question(
     found: list[Kind] = []
     for fit in starts:
         seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
-        servo = fit.structure.name == _SERVO
+        servo = fit.structure.name in _SERVOS
         found += [one.kind for one in seen if one.certain and (one.kind in ALIKE or not servo)]
     return list(dict.fromkeys(found))
 
@@ -146,7 +149,7 @@ def settled_rows(
 
     The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
     """
-    if start.structure.name == _SERVO and kind != "friction":
+    if start.structure.name in _SERVOS and kind != "friction":
         return
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)
@@ -257,7 +260,8 @@ def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, 
     waits = None if one.counts is None else ~one.counts
     if waits is not None:
         waits[: max(one.begins, joint.forgotten)] = False
-    std = float(np.sqrt(own[-1, -1]))
+    least = float(residual @ residual) / freedom / float(tools[-1] @ tools[-1])  # others known
+    std = float(np.sqrt(max(own[-1, -1], least)))
     part = NonlinearPart(
         kind=kind,
         at=one.at,
@@ -309,10 +313,11 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
 def _stable_steps(fit: Fit, steps: Real) -> Real:
     """Steps of theta to either side of which the model is stable and of like dynamics, (p + 1,)."""
     out, start = steps.copy(), 1
+    out[0] = min(out[0], 1.0)  # of the delay: a sample
     for order in fit.structure.sections:
-        out[start] = min(out[start], 1.0)  # a logarithm
+        out[start] = min(out[start], PART)  # a logarithm
         if order == 2:
-            out[start + 1] = min(out[start + 1], 0.5 * fit.theta[start + 1])
+            out[start + 1] = min(out[start + 1], PART * fit.theta[start + 1])
         start += order
     return np.asarray(out)
 
