@@ -200,7 +200,7 @@ def _with_rows(
         count = 1 - (joint.problem.fixed().shape[0] - problem.fixed().shape[0])
         leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural, others=others)
-        starts = linear_starts(problem, course.best, joint)
+        starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
         while kinds:
             kind = kinds.pop(0)
@@ -211,7 +211,7 @@ def _with_rows(
             if one is not None and beside is not None and beside.related:
                 gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
                 yield gain, one, beside, other
-                if leaves_noise(beside, one, seen.rounding):
+                if beside.best.fit.is_white:
                     continue
             if kind == ALIKE[0] and ALIKE[1] not in kinds:
                 kinds.append(ALIKE[1])
@@ -255,7 +255,9 @@ def _likeliest(
     With the dynamics of its start, or, unless it acts within these, with those that lead. Of
     friction, no other lag is tried once it leaves noise; no further start once the noise is white.
     """
-    best, most, found, white = joint.best.fit, 0.0, None, False
+    best, white = joint.best.fit, False
+    found: Nonlinearity | None = None
+    lead, led = best, former  # the likeliest fit so far, and its data
     for start in starts:
         for one in settled_rows(kind, command, problem, start):
             leading = [(joint.problem, best)] if one.within is None else []
@@ -263,10 +265,10 @@ def _likeliest(
                 data = with_row(before, one)
                 fit = refit(data, begun)
                 again = replace(joint, problem=data, best=replace(joint.best, fit=fit))
-                gain = criterion_gain(again, count, best, former)
                 white = white or fit.is_white
-                if gain > most:
-                    most, found = gain, one
+                # Compared at samples that count in both: of friction, other samples may stick.
+                if criterion_gain(again, count if found is None else 0, lead, led) > 0.0:
+                    found, lead, led = one, fit, data
             if one.within is not None and is_noise(data, fit, rounding):
                 break
         if white:

@@ -146,7 +146,9 @@ def _pair(
         ResponseBandwidths(),
     )
     left, untested = attempt(
-        "misfit", lambda: _left(question, joint, i, matrix), Misfit(share=0.0, probability=1.0)
+        "misfit",
+        lambda: _left(question, joint, i, matrix),
+        Misfit(share=0.0, within=0.0, probability=1.0),
     )
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
     bent = 0.0

@@ -76,7 +76,7 @@ def test_what_neither_a_rich_structure_nor_a_nonlinearity_describes_is_doubted_w
 
 
 def test_dynamics_are_accused_where_a_linear_response_explains_more(clean):
-    follows = replace(clean, misfit=Misfit(share=0.6, probability=1e-30))
+    follows = replace(clean, misfit=Misfit(share=0.6, within=0.6, probability=1e-30))
     (found,) = bent(replace(follows, bends=(bend(clean),)))
     assert (found.code, found.severity) == ("other_dynamics", "doubt")
     assert found.parameters == ("scale_factor",)

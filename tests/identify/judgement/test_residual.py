@@ -40,14 +40,20 @@ def test_a_residual_that_follows_the_input_casts_doubt_from_three_per_cent_on(
 ):
     """Of an output with 10 % left over, a share s of its power is 10 √s per cent."""
     (found,) = lack_of_fit(
-        replace(clean, misfit=Misfit(share=share, probability=1e-9), fit_percent=90 - 10 * 1.2)
+        replace(
+            clean,
+            misfit=Misfit(share=share, within=share, probability=1e-9),
+            fit_percent=90 - 10 * 1.2,
+        )
     )
     assert (found.code, found.severity, found.parameters) == ("lack_of_fit", severity, MODELLED)
     assert f"about {100 * 0.22 * np.sqrt(share):.2g} % of the output" in found.message
 
 
 def test_what_explains_none_of_the_residual_is_not_said(clean):
-    assert not [*lack_of_fit(replace(clean, misfit=Misfit(share=0.0, probability=1e-9)))]
+    assert not [
+        *lack_of_fit(replace(clean, misfit=Misfit(share=0.0, within=0.0, probability=1e-9)))
+    ]
 
 
 def test_a_missing_resonance_is_a_lack_of_fit(field_record, evidence_of):
@@ -68,7 +74,9 @@ def test_coloured_noise_is_said_and_doubted_only_where_it_is_most_of_the_output(
     assert (found.severity, found.parameters) == ("info", MODELLED)
     (colour,) = noise_colour_of(evidence)
     assert (colour.code, colour.parameters) == ("noise_colour", ("noise_std",))
-    follows = replace(evidence, fit_percent=40.0, misfit=Misfit(share=0.1, probability=0.0))
+    follows = replace(
+        evidence, fit_percent=40.0, misfit=Misfit(share=0.1, within=0.1, probability=0.0)
+    )
     (found,) = coloured_noise(follows)
     assert found.severity == "doubt"
 

@@ -31,6 +31,7 @@ def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
     significant = [test for test in tests if test.probability < FALSE_ALARM] or tests
     return Misfit(
         share=max(test.share for test in significant),
+        within=max(test.within for test in significant),
         probability=min(len(tests) * min(test.probability for test in significant), 1.0),
     )
 
@@ -48,7 +49,7 @@ def misfits_of_inputs(
     coloured = None if some is None or some.is_white else some.residual
     found = []
     for u, fit, band in zip(inputs, fits, bands, strict=True):
-        tests = [Misfit(share=0.0, probability=1.0)]
+        tests = [Misfit(share=0.0, within=0.0, probability=1.0)]
         if fit.related:
             best = fit.best.fit
             tests.append(misfit(u, best.residual, delay=best.delay, band=band))

@@ -389,7 +389,7 @@ def owed_to_input(problem: Problem, fit: Fit, data: Data) -> float:
     misfit, spread = data.misfit(fit), problem.spread
     owed = 0.0
     if misfit.probability < FALSE_ALARM:
-        owed = float(np.sqrt(misfit.share * fit.cost / spread)) if spread else 0.0
+        owed = float(np.sqrt(misfit.within * fit.cost / spread)) if spread else 0.0
         if owed <= MATERIAL and data.keeps_samples and _misses_part(problem, fit, data):
             owed = np.inf
     return np.inf if owed <= MATERIAL and is_poor(fit, spread) else owed

@@ -46,7 +46,7 @@ def is_unexplainable(
     lags = (fit.delay, float(likeness(white_u, white_y, y.size // 2).lag))
     answers = [misfit(white_u, white_y, delay=lag, band=band) for lag in lags]
     answer = min(answers, key=lambda answer: answer.probability)
-    reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.share, 0.999)))
+    reachable = -0.5 * problem.counted * float(np.log1p(-min(answer.within, 0.999)))
     return answer.probability > FALSE_ALARM or reachable < least
 
 

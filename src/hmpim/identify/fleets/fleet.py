@@ -334,7 +334,7 @@ def _leaves_noise(fleet: Fleet, theta: Real, residual: Real) -> Mask:
     if residual.shape[0] == 0:
         return np.zeros(0, dtype=bool)
     spectra = scipy.fft.rfft(residual)
-    _, probability = misfits(
+    *_, probability = misfits(
         scipy.fft.rfft(fleet.u - fleet.u.mean()),
         spectra,
         samples=fleet.u.size,

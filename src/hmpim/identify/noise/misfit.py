@@ -27,6 +27,7 @@ class Misfit:
     # of the residual's power, at all frequencies, explained by a smooth response to the input
     # within its band beyond what noise would explain; 0 when none
     share: float
+    within: float  # the same, of the residual's power within the band
     probability: float  # chance of so much, or more, if the model were right
 
 
@@ -49,9 +50,13 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
     spectra, delays = _transform(residual, bins)[None], np.array([delay])
     found = misfits(stimulus[:bins], spectra, samples=u.size, delays=delays, band=band)
-    followed, probability = (float(values[0]) for values in found)
+    followed, inside, probability = (float(values[0]) for values in found)
     total = 0.5 * u.size * float(residual @ residual)  # of the bins above 0
-    return Misfit(share=min(followed / total, 1.0) if total else 0.0, probability=probability)
+    return Misfit(
+        share=min(followed / total, 1.0) if total else 0.0,
+        within=followed / inside if inside else 0.0,
+        probability=probability,
+    )
 
 
 def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misfit | None:
@@ -79,6 +84,7 @@ def _misfit_at_lines(u: Real, residual: Real, band: tuple[float, float]) -> Misf
     above = float(np.sum(power[moved] - noise))
     return Misfit(
         share=max(above, 0.0) / float(whole.sum()),
+        within=max(above, 0.0) / float(power.sum()),
         probability=float(scipy.special.fdtrc(count, float(room[moved].min()), ratio)),
     )
 
@@ -91,8 +97,10 @@ def _transform(residual: Real, bins: int) -> Complex:
 
 def misfits(
     stimulus: Complex, residuals: Complex, *, samples: int, delays: Real, band: tuple[float, float]
-) -> tuple[Real, Real]:
-    """Test many residuals of one input as `misfit` does one: followed power, probability, (k,).
+) -> tuple[Real, Real, Real]:
+    """Test many residuals of one input as `misfit` does one.
+
+    Returned are the power that follows the input, that within the band, and the probability, (k,).
 
     `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
     residuals, and `delays`, (k,), are in samples.
@@ -101,7 +109,7 @@ def misfits(
         stimulus, residuals, samples=samples, delays=delays, band=band
     )
     if not power.size:
-        return np.zeros(delays.size), np.ones(delays.size)
+        return np.zeros(delays.size), np.zeros(delays.size), np.ones(delays.size)
     noise = (total - taken) / (width - 1)
     noisy = np.all(noise > 0, axis=1)
     noise = np.where(noisy[:, None], noise, 1.0)
@@ -111,6 +119,7 @@ def misfits(
     beyond = np.sum(taken - noise, axis=1)
     return (
         np.where(noisy, np.maximum(beyond, 0.0), 0.0),
+        np.sum(total, axis=1),
         np.where(noisy, scipy.special.chdtrc(2 * power.size, statistic), 1.0),
     )
 

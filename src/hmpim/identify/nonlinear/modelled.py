@@ -101,7 +101,9 @@ def is_explained(joint: JointFit) -> bool:
     return plain or fit.structure.sampled or joint.problem.y.size > LONGEST
 
 
-def linear_starts(problem: Problem, plain: Fit, joint: JointFit) -> list[Fit]:
+def linear_starts(
+    problem: Problem, plain: Fit, joint: JointFit, structures: tuple[StructureName, ...]
+) -> list[Fit]:
     """Linear fits to which a nonlinearity may be added: the plain one, and those of a servo.
 
     A servo's lag makes a third pole, which a plain fit takes for delay, and commands of velocity
@@ -118,7 +120,9 @@ def linear_starts(problem: Problem, plain: Fit, joint: JointFit) -> list[Fit]:
         if trial.fit.structure.name in _SERVOS:
             starts[trial.fit.structure.name] = trial.fit.theta
     servos = [
-        fit_structure(problem, STRUCTURES[name], starts[name]) for name in _SERVOS if name in starts
+        fit_structure(problem, STRUCTURES[name], starts[name])
+        for name in _SERVOS
+        if name in starts and name in structures
     ]
     return [plain, *servos]
 

@@ -80,7 +80,7 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     almost_binary = float(np.mean(np.diag(left) / size)) < MUCH  # its edges are between the samples
     power, determined = explained(left, gain, least=_SEEN, size=size)
     if almost_binary or not determined or cost <= 0.0:
-        return Misfit(share=0.0, probability=1.0)
+        return Misfit(share=0.0, within=0.0, probability=1.0)
     freedom = products.counted - linear.rows.shape[0] - int(determined)
     return explained_by(float(power), int(determined), cost, freedom)
 

@@ -76,8 +76,10 @@ def explained_by(power: float, count: int, cost: float, freedom: int) -> Misfit:
     `cost` is the sum of squares of the residual, and `freedom` its degrees of freedom.
     """
     variance = cost / max(freedom, 1)
+    share = max((power - count * variance) / cost, 0.0)
     return Misfit(
-        share=max((power - count * variance) / cost, 0.0),
+        share=share,
+        within=share,
         probability=float(scipy.special.chdtrc(count, power / variance)),
     )
 
