@@ -36,7 +36,7 @@ def bandwidth(*, friction: bool, base: bool, peak: float) -> str:
         axis="pitch",
         base="auto" if base else None,
     )
-    pair = hmpim.identify(hmpim.run(table, sweep, rng=1)).pairs[0]
+    pair = hmpim.identify(hmpim.run(table, sweep, rng=1), nonlinear="reported").pairs[0]
     near = pair.bandwidth_phase90
     if near is None:
         return "–"

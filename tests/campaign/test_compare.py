@@ -209,7 +209,10 @@ def test_an_earlier_study_of_the_first_schema_is_compared_with(demo, request, tm
 
 
 def test_bins_of_the_record_lie_about_the_estimate(demo):
-    """The paper's ratio of spectra, bin by bin, and the local estimate are of one thing."""
+    """The paper's ratio of spectra, bin by bin, and the local estimate are of one thing.
+
+    Friction, a hundredth of the motion, is in the bins alone.
+    """
     _, folder = demo
     (case,) = (folder / "cases").glob("*.json")
     pair = json.loads(case.read_text(encoding="utf-8"))["pairs"][0]
@@ -224,7 +227,7 @@ def test_bins_of_the_record_lie_about_the_estimate(demo):
     )
     off = ratio - smooth
     assert np.sqrt(np.mean(np.abs(off) ** 2)) < 0.05
-    assert abs(off.mean()) < 0.01
+    assert abs(off.mean()) < 0.02
 
 
 def test_without_figures_each_test_shows_all_its_cases_by_what_sets_them_apart(tmp_path):
