@@ -8,9 +8,9 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from typing import Any
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.progress import Progress
@@ -136,7 +136,8 @@ def levels(tick: Callable[[], None]) -> str:
         + line("… friction off", *rows[False])
         + line("… friction on and in the model, behind the hold", *linear)
         + line("its verdict", *verdicts)
-        + f"\nExact, without friction: {exact:.1f} Hz at every level; {behind:.1f} Hz behind the hold.\n"
+        + f"\nExact, without friction: {exact:.1f} Hz at every level; {behind:.2f} Hz behind "
+        "the hold.\n"
     )
 
 

@@ -27,7 +27,7 @@ from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
-from hmpim.identify.worth import MATERIAL, PART
+from hmpim.identify.worth import FEW, MATERIAL, PART
 from hmpim.model.dynamics import StructureName
 from hmpim.model.fine import FINE, finely, sampled
 from hmpim.model.friction import Rubbing, rubbed
@@ -44,9 +44,6 @@ _Lag = Callable[[Fit], float]
 
 _GUESSES = 2
 """Rows from which the size of friction is guessed, each from that of the former."""
-
-_SURELY = 0.1
-"""Share of friction by which it may be larger where a unit surely moves."""
 
 TURNS = 12
 """Turns after which a row that still changes is given up."""
@@ -193,7 +190,7 @@ def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: flo
     fine = linear_part_finely(problem, fit, command.others)
     unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
     effect, moves = rubbed(fine, unit, force)
-    moves &= rubbed(fine, unit, (1.0 + _SURELY) * force)[1]
+    moves &= rubbed(fine, unit, (1.0 + FEW) * force)[1]
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _rubbing(command, lag, data, fit, abs(float(fit.nuisance[-1])))
