@@ -132,7 +132,7 @@ def _with_all(
     bending, own = described(_known_besides(joined, again, i), row, question.aligned.fs)
     fits, covariances = list(again.fits), list(again.covariances)
     fits[i], covariances[i] = without_rows(joined, slice(-1, None)), own
-    return replace(again, fits=tuple(fits), covariances=tuple(covariances), bending=bending)
+    return replace(again, fits=tuple(fits), covariances=tuple(covariances), bending=bending, bent=i)
 
 
 def _moved_by_others(fitted: OutputFit, i: int) -> Real:

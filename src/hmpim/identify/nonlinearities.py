@@ -100,9 +100,9 @@ def looked_through(
         return joint, None, ()
     aligned, best, floor = question.aligned, joint.best, _floor(question, found)
     source = aligned.inputs[i]
-    problem, fit = joint.problem, best.fit
-    if joined.bending is not None:
-        problem, fit = joined.bending.as_measured(joint)
+    problem, fit, bending = joint.problem, best.fit, joined.bending_of(i)
+    if bending is not None:
+        problem, fit = bending.as_measured(joint)
     look = partial(
         inspect_nonlinearity,
         source.values,
@@ -110,13 +110,13 @@ def looked_through(
         fit,
         fs=aligned.fs,
         plain=plain,
-        modelled=joined.bending is not None,
+        modelled=bending is not None,
         others=[other.values for other in aligned.inputs if other is not source],
         floor=floor,
         unit=question.output.unit,
     )
     inspection, unseen = attempt("nonlinearity", look, None)
-    if joined.bending is not None:
+    if bending is not None:
         return joint, inspection, unseen
     if inspection is not None and inspection.fit is not best.fit:
         return taking(joint, inspection.fit), inspection, unseen

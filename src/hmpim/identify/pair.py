@@ -28,7 +28,7 @@ from hmpim.identify.judgement import Evidence, attempt, judge
 from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.nonlinear.bends import Bend
-from hmpim.identify.nonlinear.modelled import modelled_finding
+from hmpim.identify.nonlinear.modelled import Modelled, modelled_finding
 from hmpim.identify.nonlinear.nonlinearity import Inspection
 from hmpim.identify.nonlinear.speed import speed_finding
 from hmpim.identify.nonlinearities import looked_through, possible_bends
@@ -116,7 +116,7 @@ def _pair(
     """Describe an output that follows an input."""
     aligned, output = question.aligned, question.output
     source, band = aligned.inputs[i], question.band(i)
-    units = source.unit, output.unit
+    units, bending = (source.unit, output.unit), joined.bending_of(i)
     joint, censored, covariance = _refined(question, found, joined, i)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
     joint, inspection, unseen = looked_through(question, found, joined, joint, i, plain)
@@ -152,7 +152,7 @@ def _pair(
     )
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
     bent = 0.0
-    if inspection is not None and said and joined.bending is None:
+    if inspection is not None and said and bending is None:
         bent = inspection.summary.nonlinear
     evidence = replace(
         evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
@@ -164,7 +164,7 @@ def _pair(
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *_disturbances(question, joined, units, white=readings.white),
+        *_disturbances(question, joined, i, units, white=readings.white),
         *(*unseen, *unmoved, *unread, *untested),
     )
     fit = joint.best.fit
@@ -190,21 +190,23 @@ def _pair(
         prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
         residual=fit.residual if course is None else fit.residual * course,
         covariance=highest_first(readings.coefficient_covariance, readings.system),
-        nonlinearity=None if inspection is None else _summary(inspection, joined, units),
-        nonlinear_part=_nonlinear_part(question, joined),
+        nonlinearity=None if inspection is None else _summary(inspection, bending, units),
+        nonlinear_part=_nonlinear_part(question, bending),
     )
 
 
-def _nonlinear_part(question: Question, joined: OutputFit) -> NonlinearPart | None:
+def _nonlinear_part(question: Question, bending: Modelled | None) -> NonlinearPart | None:
     """The nonlinearity that the model includes."""
     if question.limited is not None:
         return question.limited.part(question.aligned.fs)
-    return None if joined.bending is None else joined.bending.part
+    return None if bending is None else bending.part
 
 
-def _summary(inspection: Inspection, joined: OutputFit, units: tuple[str, str]) -> Nonlinearity:
+def _summary(
+    inspection: Inspection, modelled: Modelled | None, units: tuple[str, str]
+) -> Nonlinearity:
     """What is nonlinear; its kind and size as the model has them, if it includes them."""
-    summary, modelled = inspection.summary, joined.bending
+    summary = inspection.summary
     if modelled is None:
         return summary
     return replace(summary, kinds=(modelled.kind,), size=modelled.estimate(units))
@@ -219,7 +221,7 @@ def _found_before(question: Question, unit: str) -> list[Finding]:
 
 
 def _disturbances(
-    question: Question, joined: OutputFit, units: tuple[str, str], *, white: bool
+    question: Question, joined: OutputFit, i: int, units: tuple[str, str], *, white: bool
 ) -> list[Finding]:
     """Findings about a drift, hum and a nonlinearity that the model includes."""
     fs, unit = question.aligned.fs, question.output.unit
@@ -228,8 +230,9 @@ def _disturbances(
         found += drift_findings(joined.drifting, fs, unit, white=white)
     if joined.humming is not None:
         found.append(hum_finding(joined.humming, fs, unit))
-    if joined.bending is not None:
-        found.append(modelled_finding(joined.bending, units))
+    bending = joined.bending_of(i)
+    if bending is not None:
+        found.append(modelled_finding(bending, units))
     return found
 
 

@@ -178,3 +178,74 @@ def test_a_standard_deviation_beyond_which_the_model_is_unstable_is_no_step_of_a
     pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=100.0)).pairs[0]
     assert pair.nonlinear_part is not None
     assert np.isfinite(pair.nonlinear_part.std)
+
+
+SERVO = {"natural_frequency": 12.0, "damping_ratio": 0.6, "delay": 0.012, "scale_factor": 1.1}
+BELOW = np.polymul(
+    [(2 * np.pi * 12.0) ** -2, 2 * 0.6 / (2 * np.pi * 12.0), 1.0], [0.02, 1.0]
+)  # with a lag of 20 ms
+LAGS = {"of the loop": BELOW[0] / BELOW[1], "of the command": 0.02}
+
+
+def servo(lag: float, friction: float = 0.03) -> np.ndarray:
+    """Motion of a servo of third order, by steps of time."""
+    part = NonlinearPart(
+        kind="friction", at="force", size=friction, std=0.0, reach=1.0, between="foh", lag=lag
+    )
+    fine = 8
+    unit = hmpim.Model(
+        delay=0.012, scale_factor=1.1, denominator=tuple(BELOW), bias=0.2, nonlinear=part
+    )
+    t = np.arange(T.size * fine) / (FS * fine)
+    return unit.simulate(sweep(t), t, intersample="foh")[::fine]
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.01])
+@pytest.mark.parametrize("place", sorted(LAGS))
+def test_friction_in_a_servo_whose_force_lags(place, rounding):
+    """Also behind a coarse encoder, whose rounding error is most of the residual, and not white."""
+    clean = servo(LAGS[place])
+    y = clean + 0.003 * np.random.default_rng(5).standard_normal(T.size)
+    y = np.round(y / rounding) * rounding if rounding else y
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": sweep(T)}, {"y": y}, fs=FS))["y", "u"]
+    assert pair.structure == "third_order"
+    assert pair.verdict == "ok"
+    for name, truth in SERVO.items():
+        figure = getattr(pair.parameters, name)
+        assert abs(figure.value - truth) < 4 * figure.spread + 1e-3 * truth, name
+        assert figure.spread < 0.01 * truth, name
+    part = pair.nonlinear_part
+    assert part.kind == "friction"
+    assert part.size == pytest.approx(0.03, abs=4 * part.std + 0.0005)
+    assert part.lag == pytest.approx(LAGS[place], rel=0.03)
+    assert np.std(pair.prediction - clean) < 0.001
+
+
+def test_stated_structures_are_kept_to():
+    y = servo(LAGS["of the loop"]) + 0.003 * np.random.default_rng(5).standard_normal(T.size)
+    record = hmpim.Record.from_arrays({"u": sweep(T)}, {"y": y}, fs=FS)
+    pair = hmpim.identify(record, structures=["first_order", "second_order"])["y", "u"]
+    assert pair.structure in ("first_order", "second_order")
+    assert pair.nonlinear_part is None or pair.nonlinear_part.lag == 0.0
+
+
+def test_friction_of_the_leading_input_of_several():
+    """Next to a coupling from another input, which friction would hide."""
+    t = np.arange(T.size) / FS
+    other = np.sin(2 * np.pi * (4.0 * t - 0.22 * t**2))
+    coupled = hmpim.Model(delay=0.02, scale_factor=0.02, denominator=(0.01, 1.0))
+    moved = hmpim.simulate(coupled, other, fs=FS, intersample="bandlimited")
+    y = servo(LAGS["of the loop"]) + moved
+    y += 0.003 * np.random.default_rng(6).standard_normal(T.size)
+    inputs = {"u": sweep(T), "other": other}
+    result = hmpim.identify(hmpim.Record.from_arrays(inputs, {"y": y}, fs=FS))
+    pair, coupling = result["y", "u"], result["y", "other"]
+    assert pair.verdict == "ok"
+    assert pair.nonlinear_part.kind == "friction"
+    assert coupling.nonlinear_part is None
+    for name, truth in SERVO.items():
+        figure = getattr(pair.parameters, name)
+        assert abs(figure.value - truth) < 4 * figure.spread + 2e-3 * truth, name
+    gain = coupling.parameters.scale_factor
+    assert abs(gain.value - 0.02) < 4 * gain.spread
+    assert gain.spread < 0.002

@@ -63,7 +63,8 @@ class OutputFit:
     asked: int = 0  # the input with which the drift was fitted
     humming: Humming | None = None  # mains hum; each fit's output is without it
     gaining: GainChange | None = None  # a gain that changes, with one input only
-    bending: Modelled | None = None  # a nonlinearity that the model includes, with one input only
+    bending: Modelled | None = None  # a nonlinearity that the model includes
+    bent: int = 0  # the input whose response has it
 
     @property
     def prediction(self) -> Real:
@@ -88,6 +89,10 @@ class OutputFit:
         """The input that moves the output most."""
         parts = [float(np.std(contribution(fit))) if fit.related else -1.0 for fit in self.fits]
         return int(np.argmax(parts))
+
+    def bending_of(self, i: int) -> Modelled | None:
+        """The nonlinearity of the response to an input, if the model includes one."""
+        return self.bending if i == self.bent else None
 
     @property
     def disturbance(self) -> Real | None:
