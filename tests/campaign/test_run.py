@@ -327,6 +327,32 @@ def test_load_of_all_axes_together_is_predicted_and_refused(tmp_path, monkeypatc
         run_campaign(table_plan(level=0.99), tmp_path)
 
 
+@pytest.mark.parametrize(("levels", "wanted"), [((0.5,), {"modelled"}), ((0.2, 0.5), {"reported"})])
+def test_friction_is_modelled_unless_levels_are_compared(tmp_path, monkeypatch, levels, wanted):
+    import hmpim.campaign.run as module
+
+    asked = []
+
+    def noted(record, *, nonlinear):
+        asked.append(nonlinear)
+        return hmpim.identify(record, nonlinear=nonlinear)
+
+    monkeypatch.setattr(module, "identify", noted)
+    pytest.importorskip("mujoco")
+    plan = table_plan(level=0.5, seconds=1.0)
+    test = replace(
+        plan.tests[0],
+        axes=("roll",),
+        rates=(500.0,),
+        loads=("acceptance",),
+        levels=levels,
+        together=False,
+    )
+    run_campaign(replace(plan, tests=(test,)), tmp_path)
+    assert set(asked) == wanted
+    assert len(asked) == len(levels)
+
+
 def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path):
     """One answer to one question: the campaign's, and that of the record it has kept."""
     pytest.importorskip("mujoco")

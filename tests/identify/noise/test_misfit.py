@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 from scipy.signal import lfilter
 
 from hmpim.identify.noise.misfit import misfit
@@ -43,3 +44,17 @@ def test_a_sweep_has_no_lines():
     hum = np.cos(2 * np.pi * 0.05 * T)
     noise = np.random.default_rng(2).standard_normal(N)
     assert misfit(u, hum + noise, delay=0.0, band=(0.001, 0.2)).share < 0.05
+
+
+def test_the_share_is_of_the_whole_power_and_within_of_that_in_the_band():
+    """A response to a slow input, in noise up to half the rate: noise above the band counts too."""
+    rng = np.random.default_rng(3)
+    n = 8000
+    u = scipy.signal.lfilter(*scipy.signal.butter(4, 0.1, fs=1.0), rng.standard_normal(n))
+    u /= u.std()
+    noise = rng.standard_normal(n)
+    residual = 0.5 * u + noise
+    found = misfit(u, residual, delay=0.0, band=(0.001, 0.1))
+    assert found.probability < 1e-9
+    assert found.share == pytest.approx(0.25 / 1.25, abs=0.03)
+    assert 2.0 * found.share < found.within < 1.0
