@@ -202,8 +202,7 @@ def _with_rows(
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
-        while kinds:
-            kind = kinds.pop(0)
+        for kind in kinds:  # which may grow
             one = _likeliest(
                 kind, command, problem, starts, leading, joint.problem, count, seen.rounding
             )
