@@ -202,9 +202,11 @@ def _with_rows(
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
-        for kind in kinds:  # which may grow
+        while kinds:
+            kind = next(iter(kinds))
+            begun = kinds.pop(kind)
             one = _likeliest(
-                kind, command, problem, starts, leading, joint.problem, count, seen.rounding
+                kind, command, problem, begun, leading, joint.problem, count, seen.rounding
             )
             beside = None if one is None else _fitted_with(steady, seen, problem, one)
             if one is not None and beside is not None and beside.related:
@@ -212,8 +214,9 @@ def _with_rows(
                 yield gain, one, beside, other
                 if beside.best.fit.is_white:
                     continue
-            if kind == ALIKE[0] and ALIKE[1] not in kinds:
-                kinds.append(ALIKE[1])
+            play, friction = ALIKE
+            if kind == play:  # the plain fit first
+                kinds[friction] = [*begun, *kinds.pop(friction, [])]
 
 
 def _fitted_with(

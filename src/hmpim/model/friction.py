@@ -97,7 +97,9 @@ class Rubbing:
         return np.stack([[0.0, 1.0, 0.0, 0.0], speed, force, [0.0] * 4])
 
 
-def rubbed(x: _Real, rubbing: Rubbing, force: float) -> tuple[_Real, NDArray[np.bool_]]:
+def rubbed(
+    x: _Real, rubbing: Rubbing, force: float, *, margin: float = 0.0
+) -> tuple[_Real, NDArray[np.bool_]]:
     """Effect of friction on the output of a unit.
 
     Parameters
@@ -108,11 +110,13 @@ def rubbed(x: _Real, rubbing: Rubbing, force: float) -> tuple[_Real, NDArray[np.
         The dynamics.
     force : float
         Friction, as the deflection at which the restoring force equals it.
+    margin : float
+        Share by which friction may be larger where the unit surely moves.
 
     Returns
     -------
     effect, moves : ndarrays, shape (m,)
-        What friction adds to x, and whether the unit moves.
+        What friction adds to x, and whether the unit moves, with so much more friction as well.
 
     Examples
     --------
@@ -122,7 +126,7 @@ def rubbed(x: _Real, rubbing: Rubbing, force: float) -> tuple[_Real, NDArray[np.
     >>> bool(abs(effect[-800:]).max() < 0.2), bool(moves.all())
     (True, False)
     """
-    return _Unit(x, rubbing, force).follow()
+    return _Unit(x, rubbing, force, (1.0 + margin) * force).follow()
 
 
 class _Unit:
@@ -131,8 +135,8 @@ class _Unit:
     Its state is that of z - x, and the friction, at a step.
     """
 
-    def __init__(self, x: _Real, rubbing: Rubbing, force: float) -> None:
-        self.x, self.force, self.lag = x, force, rubbing.lag
+    def __init__(self, x: _Real, rubbing: Rubbing, force: float, most: float) -> None:
+        self.x, self.force, self.most, self.lag = x, force, most, rubbing.lag
         self.last = x.size - 1
         rates = rubbing.rates()
         self.speed = np.gradient(x, _STEP)
@@ -142,6 +146,7 @@ class _Unit:
         self.moved = _powers(self.within[_PARTS], _AHEAD)
         self.shifts, self.speeds = (np.ascontiguousarray(self.moved[:, k]) for k in (0, 1))
         self.fades = np.exp(-_STEP / self.lag) if self.lag else 0.0
+        self.unsure = 0  # step up to which more friction would hold the unit
         self.usual = _AHEAD  # steps from one reversal to the next, roughly
         self.effect = np.zeros(x.size)
         self.moves = np.ones(x.size, dtype=bool)
@@ -205,34 +210,26 @@ class _Unit:
         w = thrust + state.item(2) if self.lag else pull - z
         if abs(w) <= self.force:
             return self._stick(at + 1, w - (pull - z), z, 1.0 - share, state)
+        if abs(w) <= self.most and at + 1 >= self.unsure:
+            self._doubt(at + 1, w - (pull - z), z, 1.0 - share)
         state[-1] = self.force if w > 0.0 else -self.force
         return at + 1, self._later(state, 1.0 - share)
 
     def _stick(
         self, at: int, excess: float, z: float, share: float, state: _Real
     ) -> tuple[int, _Real]:
-        """Hold the unit at z until w exceeds the friction.
-
-        `excess` is w beyond what it tends to, `share` the part of a step that has passed since.
-        """
-        first, ahead = at, _FEWEST
-        while True:
-            ahead = min(2 * ahead, self.x.size - at)
-            w = self.pull[at : at + ahead] - z
-            if excess:
-                w += excess * self.fades ** (at - first + share + np.arange(ahead))
-            beyond = np.abs(w) > self.force
-            k = beyond.argmax().item()
-            if beyond.item(k):
-                break
-            at += ahead
-            if at == self.x.size:
-                self._hold(first, at, z)
-                return at, state
-        at += k
-        self._hold(first, at, z)
-        now, before = w.item(k), w.item(k - 1) if k else self.force
-        passed = (self.force - abs(before)) / (abs(now) - abs(before)) if k else 1.0
+        """Hold the unit at z until w exceeds the friction; the rest as for `_held`."""
+        first = at
+        at, now, before = self._held(first, excess, z, share, self.force)
+        if first >= self.unsure and self.most > self.force:
+            self._doubt(first, excess, z, share)
+        self.effect[first:at] = z - self.x[first:at]
+        self.moves[first:at] = False
+        if at == self.x.size:
+            return at, state
+        passed = 1.0
+        if at > first:
+            passed = (self.force - abs(before)) / (abs(now) - abs(before))
         x, speed, thrust = (
             known.item(at)
             if passed == 1.0
@@ -245,10 +242,32 @@ class _Unit:
         state[-1] = force
         return at, self._later(state, 1.0 - passed)
 
-    def _hold(self, first: int, last: int, z: float) -> None:
-        """The unit at z from one step to before another one."""
-        self.effect[first:last] = z - self.x[first:last]
-        self.moves[first:last] = False
+    def _doubt(self, first: int, excess: float, z: float, share: float) -> None:
+        """Steps for which more friction would hold the unit; the rest as for `_held`."""
+        self.unsure, _, _ = self._held(first, excess, z, share, self.most)
+        self.moves[first : self.unsure] = False
+
+    def _held(
+        self, first: int, excess: float, z: float, share: float, force: float
+    ) -> tuple[int, float, float]:
+        """Step at which w exceeds a force if the unit is held at z, and w there and before.
+
+        `excess` is w beyond what it tends to, `share` the part of a step that has passed since. The
+        number of steps if it never does.
+        """
+        at, ahead, before = first, _FEWEST, force
+        while at < self.x.size:
+            ahead = min(2 * ahead, self.x.size - at)
+            w = self.pull[at : at + ahead] - z
+            if excess:
+                w += excess * self.fades ** (at - first + share + np.arange(ahead))
+            beyond = np.abs(w) > force
+            k = beyond.argmax().item()
+            if beyond.item(k):
+                return at + k, w.item(k), w.item(k - 1) if k else before
+            at += ahead
+            before = w.item(-1)
+        return at, 0.0, before
 
     def _later(self, state: _Real, share: float) -> _Real:
         """The state after a share of a step."""

@@ -129,21 +129,27 @@ def linear_starts(
 
 def kinds_in_question(
     command: Command, problem: Problem, starts: list[Fit], best: Fit
-) -> list[Kind]:
-    """Kinds that may explain the residual of one of the linear fits, the likeliest first.
+) -> dict[Kind, list[Fit]]:
+    """Kinds that may explain the residual of linear fits, the likeliest first, with these fits.
 
     None if the plain fit, the first, leaves white noise, or if poles explain what no nonlinearity
-    can.
+    can. Of a servo, friction is in question where play looks likely as well.
     """
-    least = min(fit.cost for fit in starts)
-    if problem.counted < _FEWEST or starts[0].is_white or best.cost < PART**2 * least:
-        return []
-    found: list[Kind] = []
+    if problem.counted < _FEWEST or starts[0].is_white:
+        return {}
+    found: dict[Kind, list[Fit]] = {}
     for fit in starts:
+        if best.cost < PART**2 * fit.cost:
+            continue
         seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
-        servo = fit.structure.name in _SERVOS
-        found += [one.kind for one in seen if one.certain and (one.kind in ALIKE or not servo)]
-    return list(dict.fromkeys(found))
+        kinds = [one.kind for one in seen if one.certain]
+        if fit.structure.name in _SERVOS:
+            alike = any(kind in ALIKE for kind in kinds)
+            explained = bool(seen) and (1.0 - seen[0].share) * fit.cost < TWICE * best.cost
+            kinds = ["friction"] if alike and explained else []
+        for kind in dict.fromkeys(kinds):
+            found.setdefault(kind, []).append(fit)
+    return found
 
 
 def settled_rows(

@@ -189,8 +189,7 @@ def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: flo
     """
     fine = linear_part_finely(problem, fit, command.others)
     unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
-    effect, moves = rubbed(fine, unit, force)
-    moves &= rubbed(fine, unit, (1.0 + FEW) * force)[1]
+    effect, moves = rubbed(fine, unit, force, margin=FEW)
 
     def again(data: Problem, fit: Fit) -> Nonlinearity:
         return _rubbing(command, lag, data, fit, abs(float(fit.nuisance[-1])))
