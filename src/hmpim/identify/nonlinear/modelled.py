@@ -53,6 +53,9 @@ __all__ = [
 _SERVOS: tuple[StructureName, ...] = ("third_order", "third_order_zeros")
 """Dynamics of a servo whose force lags behind its command: of the kinds, friction acts in it."""
 
+_EITHER_WAY: tuple[Kind, ...] = ("hardening", "softening", "asymmetry", "curvature")
+"""Kinds whose size has either sign."""
+
 ALIKE: tuple[Kind, ...] = ("backlash", "friction")
 """Kinds whose traces are alike below the natural frequency, against a spring."""
 
@@ -235,9 +238,15 @@ def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
 
 
 def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
-    """Whether a fit leaves noise, also at samples that do not depend on the linear part."""
+    """Whether a fit leaves noise, also at samples that do not depend on the linear part.
+
+    Rounding may look like an effect that is smaller than itself.
+    """
     problem, fit = joint.problem, joint.best.fit
-    if is_rounding(problem, fit, rounding):
+    size = float(fit.nuisance[-1])
+    if size <= 0.0 and one.kind not in _EITHER_WAY:
+        return False
+    if is_rounding(problem, fit, rounding) and float(np.std(size * one.row)) > rounding:
         return True
     every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
     return fit.is_white and is_white(every)
