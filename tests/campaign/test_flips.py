@@ -103,7 +103,8 @@ def shortened(name, tests):
     ("name", "tests", "most"),
     [
         ("section_v_reduced", ("acceptance", "levels"), 0),
-        ("demo", ("together",), 0),
+        # Of elevation's noise: its residual follows azimuth by about the share that is doubted.
+        ("demo", ("together",), 3),
     ],
 )
 def test_how_many_seeds_turn_a_pair_of_the_table(name, tests, most, tmp_path):
