@@ -103,7 +103,8 @@ def compared_case(
             raise SystemExit(f"no bandwidth of {axis} in mode {mode}")
         off = 100.0 * (found.value / truth - 1.0)
         worst = max(worst, abs(off))
-        cells += [f"{found.value:.2f} ± {found.std:.2f}", f"{off:+.2f} %"]
+        std = "?" if found.std is None else f"{found.std:.2f}"  # the interval may be withheld
+        cells += [f"{found.value:.2f} ± {std}", f"{off:+.2f} %"]
     return line(mode, axis, f"{truth:.2f}", *cells), worst
 
 
