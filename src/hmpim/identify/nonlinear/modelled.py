@@ -32,7 +32,7 @@ from hmpim.identify.nonlinear.rows import (
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
-from hmpim.identify.worth import MATERIAL, MOST, PART, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding
@@ -148,8 +148,11 @@ def kinds_in_question(
         kinds = [one.kind for one in seen if one.certain]
         if fit.structure.name in _SERVOS:
             alike = any(kind in ALIKE for kind in kinds)
-            explained = bool(seen) and (1.0 - seen[0].share) * fit.cost < TWICE * best.cost
-            kinds = ["friction"] if alike and explained else []
+            # Where a linear fit leaves white noise, friction must explain about as much.
+            rest = (1.0 - seen[0].share) * fit.cost if seen else np.inf
+            kinds = (
+                ["friction"] if alike and (not best.is_white or rest < TWICE * best.cost) else []
+            )
         for kind in dict.fromkeys(kinds):
             found.setdefault(kind, []).append(fit)
     return found
@@ -184,7 +187,7 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
     at = np.append(start.theta, one.size / scale)
     tried: list[Real] = []
     changes: list[Real] = []
-    nearest, least, last = None, PART, np.inf
+    nearest, least, last, counted = None, PART, np.inf, problem.counted
     ever: Mask | None = None  # samples that have counted since the fit was last no nearer
     for _ in range(TURNS):
         data = with_row(problem, one)
@@ -197,11 +200,11 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
             nearest, least = one, deviance
         if least < MATERIAL:
             break
-        if deviance > last:  # samples that wait come and go
-            tried.clear()
+        if deviance > last and abs(data.counted - counted) > FEW * counted:
+            tried.clear()  # many samples that wait come and go
             changes.clear()
             ever = one.counts
-        last = deviance
+        last, counted = deviance, data.counted
         tried.append(at)
         changes.append(np.append(fit.theta, fit.nuisance[-1] / scale) - at)
         at = _ahead(tried, changes)
