@@ -45,7 +45,7 @@ _Lag = Callable[[Fit], float]
 _GUESSES = 2
 """Rows from which the size of friction is guessed, each from that of the former."""
 
-TURNS = 12
+TURNS = 24
 """Turns after which a row that still changes is given up."""
 
 
