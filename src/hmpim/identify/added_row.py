@@ -71,9 +71,8 @@ def fit_with_row(question: Question, seen: Imperfections) -> OutputFit | None:
     i, joint = lead(question, seen)
     if not joint.related or joint.best.fit.cost > FEW**2 * joint.problem.spread:
         return None  # others move it too
-    none = np.zeros(joint.problem.y.size)
-    alone = _alone(question, i, none)
-    found = _likeliest_of(_with_rows(alone, seen, OutputFit(fits=(joint,)), none))
+    alone = _alone(question, i, question.output.values)
+    found = _likeliest_of(_with_rows(alone, seen, OutputFit(fits=(joint,)), None))
     if found is None or not leaves_noise(found[2], found[1], seen.rounding):
         return None
     return _with_all(question, seen, i, found, joint)
@@ -87,21 +86,29 @@ def add_row_of_leading(question: Question, seen: Imperfections, fitted: OutputFi
     i = fitted.leading
     joint, others = fitted.fits[i], _moved_by_others(fitted, i)
     first = replace(fitted, fits=(joint,), covariances=(), asked=0)
-    found = _likeliest_of(_with_rows(_alone(question, i, others), seen, first, others))
+    alone = _alone(question, i, question.output.values - others)
+    found = _likeliest_of(_with_rows(alone, seen, first, others))
     if found is None:
         return fitted
     return _with_all(question, seen, i, found, joint) or fitted
 
 
-def _alone(question: Question, i: int, others: Real) -> Question:
-    """The same question with one input, of an output without the motion by the others."""
-    output = question.output
+def _alone(question: Question, i: int, y: Real) -> Question:
+    """The same question with one input, of an output y, (n,)."""
     return replace(
         question,
         inputs=None,
         aligned=replace(question.aligned, inputs=question.aligned.inputs[i : i + 1]),
-        output=replace(output, values=output.values - others),
+        output=replace(question.output, values=y),
     )
+
+
+def _counting(question: Question, one: Nonlinearity) -> Question:
+    """The same question without samples of the output that do not count with a row."""
+    if one.counts is None:
+        return question
+    output = question.output
+    return replace(question, output=replace(output, valid=output.valid & one.counts))
 
 
 def _likeliest_of(found: Iterator[_Found]) -> _Found | None:
@@ -118,10 +125,9 @@ def _with_all(
     None unless that leaves noise, and is likelier than the fit without the row, `former`.
     """
     _, one, beside, _ = found
-    output, trend = question.output, beside.best.fit.nuisance[-1] * one.row
-    valid = output.valid if one.counts is None else output.valid & one.counts
-    straight = replace(question, output=replace(output, values=output.values - trend, valid=valid))
-    _, again = fit(straight, seen)
+    straight, trend = _counting(question, one), beside.best.fit.nuisance[-1] * one.row
+    output = replace(straight.output, values=straight.output.values - trend)
+    _, again = fit(replace(straight, output=output), seen)
     if not again.fits[i].related:
         return None
     joined, row = _joined(again, i, one, trend)
@@ -223,8 +229,7 @@ def _fitted_with(
     question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
 ) -> JointFit:
     """Fit every structure with a row for a nonlinearity."""
-    valid = question.output.valid if one.counts is None else question.output.valid & one.counts
-    question = replace(question, output=replace(question.output, valid=valid))
+    question = _counting(question, one)
     course = completed(turn_ahead(started(question, seen, with_row(problem, one).nuisance)))
     if one.within is None:
         return chosen_of(course, question.structures)

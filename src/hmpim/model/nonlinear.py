@@ -139,15 +139,11 @@ class NonlinearPart:
             raise ArgumentError(f"size = {self.size!r} of {self.words} must be more than 0")
         if not (np.isfinite(self.reach) and self.reach > 0.0):
             raise ArgumentError(f"reach = {self.reach!r} of {self.words} must be more than 0")
-        if not (np.isfinite(self.lag) and self.lag >= 0.0) or (self.lag and not self.rubs):
+        known = np.isfinite(self.lag) and self.lag >= 0.0
+        if not known or (self.lag and self.kind != "friction"):
             raise ArgumentError(
                 f"lag = {self.lag!r} s of {self.words} must be 0, or positive with friction"
             )
-
-    @property
-    def rubs(self) -> bool:
-        """Whether it is friction."""
-        return self.kind == "friction"
 
     @property
     def words(self) -> str:

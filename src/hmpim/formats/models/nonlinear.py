@@ -66,7 +66,7 @@ def _carries(to: str, part: NonlinearPart, model: Model) -> bool:
     if model.hold_period is not None and part.at != "command":
         return False
     order, zeros = len(model.denominator) - 1, len(model.numerator) - 1
-    if part.rubs:
+    if part.kind == "friction":
         able = (*_PROGRAMS, *_SCRIPTS) if part.lag else (*_PROGRAMS, *_SCRIPTS, "mujoco")
         acts = order == (3 if part.lag else 2) and zeros == 0 and model.denominator[-1] != 0.0
         return acts and to in able

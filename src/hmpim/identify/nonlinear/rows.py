@@ -28,7 +28,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
 from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
 from hmpim.identify.worth import FEW, MATERIAL, PART
-from hmpim.model.dynamics import StructureName
+from hmpim.model.dynamics import StructureName, coefficients_of
 from hmpim.model.fine import FINE, finely, sampled
 from hmpim.model.friction import Rubbing, rubbed
 from hmpim.model.nonlinear import Place
@@ -231,7 +231,7 @@ def _lag_of_servo(fit: Fit) -> float:
 
 def _lag_of_command(fit: Fit) -> float:
     """Lag of the command in front of a second-order unit: the real pole."""
-    return float(np.exp(fit.theta[-1]))
+    return float(coefficients_of(fit.structure, fit.theta[1:])[-1])
 
 
 _LAGS: dict[StructureName, tuple[_Lag, ...]] = {
