@@ -135,6 +135,7 @@ SYSTEMS = (
     family("integrator with a lag", "One pole more", k.lagging_integrator, SWEEP),
     family("washout", "First order, zero at DC", k.washout, SWEEP),
     family("AC-coupled", "A second-order sensor behind a capacitor", k.ac_coupled, SWEEP),
+    family("geophone", "Second-order high pass", k.geophone, SWEEP),
     family("differentiator", "Behind a second-order lag", k.differentiator, SWEEP),
     family("lag behind a resonance", "A third pole", k.lag_behind_resonance, SWEEP),
 )
@@ -182,6 +183,7 @@ INPUTS = (
     family("white", "Second order; band-limited, moving before the record", SECOND, k.lines()),
     family("two modes, white", "Band-limited, moving before the record", k.modes(2, 2), k.lines()),
     family("washout, white", "Band-limited, moving before the record", k.washout, k.lines()),
+    family("geophone, PRBS", "Second-order high pass; held", k.geophone, k.sequence("prbs")),
     family("static, PRBS", "Held", k.static, k.sequence("prbs")),
     family("step", "Second order; held", SECOND, k.shaped("step")),
     family("first order, step", "Held", FIRST, k.shaped("step")),

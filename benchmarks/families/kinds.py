@@ -174,6 +174,15 @@ def ac_coupled(rng: Rng, drive: Drive) -> System:
     return around(rng, drive, pairs=(pair,), lags=(slow,), washouts=1, gain=gain)
 
 
+def geophone(rng: Rng, drive: Drive) -> System:
+    """Velocity to voltage: a second-order high pass, its corner within the band."""
+    natural = drive.band[0] * log_uniform(rng, 2.0, 10.0)
+    gain = log_uniform(rng, 0.3, 3.0) / (2 * np.pi * natural) ** 2
+    return around(
+        rng, drive, pairs=((natural, float(rng.uniform(0.3, 0.9))),), washouts=2, gain=gain
+    )
+
+
 def differentiator(rng: Rng, drive: Drive) -> System:
     """A rate sensor on a position command, with its own second-order lag."""
     pair = (share_of(rng, drive, 0.4, 0.8), float(rng.uniform(0.4, 0.9)))

@@ -48,6 +48,7 @@ StructureName = Literal[
     "washout",
     "band_pass",
     "washout_second_order",
+    "second_order_high_pass",
     "integrator",
     "integrator_first_order",
     "integrator_second_order",
@@ -83,7 +84,7 @@ class Structure:
         Poles at zero, 0 or 1. With one, the scale factor is the output's rate per input.
     dc_zeros : int
         Zeros at zero: the least power of the numerator. With one, a constant input does nothing,
-        and the scale factor is the output per rate of the input.
+        and the scale factor is the output per rate of the input; with two, per acceleration.
     nyquist_zeros : int
         Of a filter in z: zeros at z = -1, as the bilinear transform puts them.
     sampled : bool
@@ -140,6 +141,7 @@ STRUCTURES: dict[StructureName, Structure] = {
         Structure(name="washout", sections=(1,), zeros=1, dc_zeros=1),
         Structure(name="band_pass", sections=(2,), zeros=1, dc_zeros=1),
         Structure(name="washout_second_order", sections=(2, 1), zeros=1, dc_zeros=1),
+        Structure(name="second_order_high_pass", sections=(2,), zeros=2, dc_zeros=2),
         Structure(name="integrator", sections=(), integrators=1),
         Structure(name="integrator_first_order", sections=(1,), integrators=1),
         Structure(name="integrator_second_order", sections=(2,), integrators=1),

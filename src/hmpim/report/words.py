@@ -215,6 +215,7 @@ _STRUCTURES = {
     "washout": "a washout",
     "band_pass": "a band-pass",
     "washout_second_order": "second order with a washout",
+    "second_order_high_pass": "a second-order high pass",
 }
 
 _PARTS = {
@@ -229,6 +230,7 @@ _PARTS = {
     "washout": "a washout",
     "band_pass": "a band-pass",
     "washout_second_order": "a second order with a washout",
+    "second_order_high_pass": "a second-order high pass",
     "integrator": "an integrator",
     "integrator_first_order": "an integrator with a first-order lag",
     "integrator_second_order": "an integrator with a second-order lag",

@@ -191,3 +191,36 @@ def test_a_weak_coupling_of_software_shares_its_phase_with_no_lag():
     record = hmpim.Record.from_arrays({"u": u, "v": v}, {"y": y}, fs=FS)
     pair = hmpim.identify(record, intersample="sampled")["y", "v"]
     assert abs(pair.scale_factor.value - 0.005) < 3 * pair.scale_factor.std
+
+
+def test_a_product_of_inertia_is_a_high_pass_and_leaves_the_noise_white():
+    """Torque by the other axis's acceleration, behind the dynamics of both: zero at DC."""
+    rng = np.random.default_rng(4)
+    poles = [np.array([(2 * np.pi * f) ** -2, z / (np.pi * f), 1.0]) for f, z, _ in OWN[:2]]
+    made = []
+    for i, (_, _, delay) in enumerate(OWN[:2]):
+        direct = hmpim.Model(delay=delay, scale_factor=1.0, denominator=tuple(poles[i]))
+        coupled = hmpim.Model(
+            delay=delay,
+            scale_factor=-1.5e-7,
+            numerator=(1.0, 0.0, 0.0),
+            denominator=tuple(np.polymul(*poles)),
+        )
+        parts = zip((direct, coupled), (INPUTS[i], INPUTS[1 - i]), strict=True)
+        answer = sum(hmpim.simulate(m, u, fs=FS, intersample="bandlimited") for m, u in parts)
+        made.append(answer + 0.001 * rng.standard_normal(TIME.size))
+    found = hmpim.identify(
+        hmpim.Record.from_arrays(
+            {f"u{j}": u for j, u in enumerate(INPUTS[:2])},
+            {f"y{i}": y for i, y in enumerate(made)},
+            fs=FS,
+            intersample="bandlimited",
+        )
+    )
+    for i in range(2):
+        own, other = found[f"y{i}", f"u{i}"], found[f"y{i}", f"u{1 - i}"]
+        assert (own.structure, own.verdict) == ("second_order", "ok")
+        assert own.noise_std.value == pytest.approx(0.001, abs=4 * own.noise_std.std)
+        assert other.structure == "second_order_high_pass"
+        assert other.scale_factor.unit == "s^2"
+        assert other.scale_factor.ci95[1] < 0.0

@@ -79,6 +79,28 @@ def test_a_lead_lag_behind_a_converter_is_found(late):
         assert figure.ci95[0] <= value <= figure.ci95[1], name
 
 
+def test_a_high_pass_behind_a_converter_has_a_known_fraction_of_a_sample():
+    """One gain cannot imitate it, as the three coefficients of a lead-lag can."""
+    natural = 2 * np.pi * 4.0
+    model = hmpim.Model(
+        delay=0.0123,
+        scale_factor=2.0 / natural**2,
+        numerator=(1.0, 0.0, 0.0),
+        denominator=(1.0 / natural**2, 1.2 / natural, 1.0),
+    )
+    u = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 400), 5)
+    answer = model.simulate(u, np.arange(u.size) / 200.0, intersample="zoh")
+    y = answer + 0.02 * np.random.default_rng(4).standard_normal(u.size)
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0))["y", "u"]
+    assert (pair.structure, pair.verdict) == ("second_order_high_pass", "ok")
+    assert pair.scale_factor.unit == "s^2"
+    assert pair.delay.std < 1e-4
+    truth = {"delay": 0.0123, "scale_factor": 2.0 / natural**2}
+    for name, value in truth.items():
+        figure = getattr(pair, name)
+        assert abs(figure.value - value) < 4.0 * figure.std, name
+
+
 def test_a_start_far_outside_the_record_is_brought_inside():
     """Of a washout that a numerator without weight put two thousand million samples ahead."""
     u = np.sign(np.sin(0.1 * np.arange(300)))

@@ -22,7 +22,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
-from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
+from hmpim.identify.coupling.weak import COUPLED, Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -135,6 +135,7 @@ def fit_together(
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
+    coupled = tuple(name for name in structures if name in COUPLED) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
     _lead(inputs, pairs, plainly)
@@ -147,7 +148,7 @@ def fit_together(
         if drifting is not None:
             return drifting
     least = pairs.cost
-    _fit_couplings(inputs, pairs, plain)
+    _fit_couplings(inputs, pairs, coupled)
     for _ in range(_TURNS):
         before = pairs.structures
         _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
@@ -159,12 +160,12 @@ def fit_together(
             least = pairs.cost
         others = pairs.structures != before
         if others or clearer:
-            _fit_couplings(inputs, pairs, plain)
+            _fit_couplings(inputs, pairs, coupled)
             pairs.refine(pairs.kept, None)
         if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
     if pairs.demote():
-        _fit_couplings(inputs, pairs, plain)
+        _fit_couplings(inputs, pairs, coupled)
     return _moved_at_once(pairs)
 
 

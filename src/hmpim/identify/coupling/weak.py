@@ -3,9 +3,10 @@
 The residual of an axis is seldom white: friction, drift and the tails of resonances are at low
 frequencies, and a plain sum of squares would fit couplings to them. Here the residual's own
 spectrum weights the sum of squares (generalised least squares: Söderström and Stoica, System
-Identification, 1989, ch. 4). Only plain structures are tried, and the one with the smallest
-criterion of H. Akaike (IEEE Trans. Autom. Control 19, 1974) is chosen: it keeps a barely
-significant pole, and so the wider error bars.
+Identification, 1989, ch. 4). Only plain structures are tried, and a second-order high pass: a
+product of inertia turns one axis's acceleration into another's disturbance, which a servo rejects
+at DC. The one with the smallest criterion of H. Akaike (IEEE Trans. Autom. Control 19, 1974) is
+chosen: it keeps a barely significant pole, and so the wider error bars.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +28,10 @@ from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.sampled import delayed_response
 from hmpim.record import Intersample
 
-__all__ = ["Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
+__all__ = ["COUPLED", "Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
+
+COUPLED: tuple[StructureName, ...] = (*PLAIN, "second_order_high_pass")
+"""Structures that a weak coupling may have."""
 
 _SMOOTHED = 0.1
 """Half-width of the average over the residual's periodogram, as a share of the frequency."""
@@ -84,17 +88,19 @@ def coupling_fit(
         plain.masked(u), plain.masked(y), longest_delay=int(problem.longest_delay)
     )
     fits: list[Fit] = []
-    tried = tuple(name for name in structures if name in PLAIN) or PLAIN
+    tried = tuple(name for name in structures if name in COUPLED) or COUPLED
     if not np.any(rough.response):  # nothing that could show a pole
         tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
         structure = STRUCTURES[name]
         if structure.order > 1 and fits and not _hopeful(problem, fits):
             continue
-        starts = starting_values(rough, structure, count=2, thorough=True)
-        if name == "second_order":
-            starts += [nested(fit) for fit in fits if fit.structure.name == "first_order"]
-            starts += _resonances(rough, fits[0].delay if fits else float(rough.lag))
+        seen = _integrated(rough, structure.dc_zeros)
+        starts = starting_values(seen, structure, count=2, thorough=True)
+        if structure.order == 2:
+            simpler = [fit for fit in fits if fit.structure.name == "first_order"]
+            starts += [nested(fit) for fit in simpler if not structure.dc_zeros]
+            starts += _resonances(seen, fits[0].delay if fits else float(rough.lag))
         found = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
         best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
@@ -114,6 +120,15 @@ def coupling_fit(
         effective_share=effective_share(best_trial.fit.residual),
         related=True,
     )
+
+
+def _integrated(rough: RoughResponse, times: int) -> RoughResponse:
+    """The rough response to the input's derivative: that of a structure without its DC zeros."""
+    if not times:
+        return rough
+    turn = (1j * rough.omega) ** times
+    weight = rough.weight * np.abs(turn) ** 2
+    return replace(rough, response=rough.response / turn, weight=weight / weight.max())
 
 
 def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
@@ -142,8 +157,11 @@ def unsettled(fit: JointFit) -> tuple[float, float]:
     By Akaike's weights of the structures (K. P. Burnham and D. R. Anderson, Model Selection and
     Multimodel Inference, 2nd ed., 2002, section 4.3), those of up to one pole taken together.
     """
-    richer = [t for t in fit.trials if t.fit.structure.order > 1]
-    plainer = [t for t in fit.trials if t.fit.structure.order < 2]
+    if fit.best.fit.structure.dc_zeros:  # no other has a scale factor of its kind
+        return 0.0, 0.0
+    steady = [t for t in fit.trials if not t.fit.structure.dc_zeros]
+    richer = [t for t in steady if t.fit.structure.order > 1]
+    plainer = [t for t in steady if t.fit.structure.order < 2]
     if not richer or not plainer:
         return 0.0, 0.0
     rich = min(richer, key=lambda t: t.criterion)

@@ -1,13 +1,11 @@
 """Refits under each assumption between the samples, from where fits under another ended."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from hmpim.identify.chance import CLEARLY
-from hmpim.identify.fitting.candidates import best_of
+from hmpim.identify.fitting.candidates import pruned
 from hmpim.identify.fitting.data import RETURNS, TASTE, Counted, Data, Fits, shifted
-from hmpim.identify.fitting.enrich import PLAIN, RICH, members
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
@@ -43,7 +41,7 @@ def fit_under_each_assumption(
 
     Poles and zeros of a rich structure may have made up for a wrong assumption. So plainer
     structures are fitted under the other assumptions if they may be about as likely, and so are
-    members of `structures` with the poles of a fitted one and other zeros.
+    members of `structures` without the poles and zeros that the leading fits need no more.
     """
     fitted = [(natural, fit) for fit in fits]
     if alone:
@@ -86,22 +84,8 @@ def fit_under_each_assumption(
             if not other.converged and other.objective < TWICE**2 * least:
                 other = refit_between(problem, other, mode, mode, hopeless=most)
             fitted.append((mode, other))
-    for start in _with_other_zeros(fits, structures):
-        if start.structure.parameters < best.structure.parameters:
-            for mode, problem in problems.items():
-                starts = [start.theta, shifted(start.theta, natural, mode)]
-                fitted.append((mode, best_of(problem, start.structure, starts, [best])))
+    for mode, problem in problems.items():
+        own = [fit for m, fit in fitted if m == mode]
+        if min(fit.objective for fit in own) < TWICE * least:
+            fitted += [(mode, fit) for fit in pruned(problem, own, structures)]
     return fitted
-
-
-def _with_other_zeros(fits: list[Fit], structures: tuple[StructureName, ...]) -> list[Fit]:
-    """Starts for structures that were not fitted, at the poles of the best fit with as many."""
-    tried = {fit.structure for fit in fits}
-    starts = []
-    for structure in members(structures, RICH):
-        alike = [f for f in fits if f.structure.sections == structure.sections]
-        alike = [f for f in alike if f.structure.integrators == structure.integrators]
-        if structure not in tried and alike and not structure.dc_zeros:
-            best = min(alike, key=lambda fit: fit.objective)
-            starts.append(replace(best, structure=structure))
-    return starts

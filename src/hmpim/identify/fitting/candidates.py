@@ -224,7 +224,12 @@ def _climbed(
         best = min([best, *found], key=lambda fit: fit.objective)
         if explains(best):
             return found
-    if shared or best.structure.integrators:
+    for structure in rich:  # the rough response need not show the corner of a high pass
+        starts = _grown(structure, [best]) if structure.dc_zeros > 1 else []
+        if starts and structure not in {fit.structure for fit in found}:
+            found.append(best_of(problem, structure, starts, [best]))
+            best = min(best, found[-1], key=lambda fit: fit.objective)
+    if explains(best) or shared or best.structure.integrators:
         return found
     for p in proposals(with_fit(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
         fit = climbed(p)
@@ -293,14 +298,17 @@ def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, .
             continue
         simplest = min(above, key=lambda f: (f.structure.parameters, f.objective))
         start = without_fast(simplest, structure)
-        if start is None:
-            continue
+        starts = [] if start is None else [start]
+        if structure.dc_zeros > 1:  # the slowest poles may be any of many
+            starts += _grown(structure, every)
         hopeless = TWICE * least
-        taste = fit_structure(problem, structure, start, iterations=TASTE, hopeless=hopeless)
-        if taste.objective < hopeless:
-            fit = best_of(problem, structure, [taste.theta], near)
-            if -2 * CLEARLY < behind(fit) < 2 * CLEARLY:  # else in another local minimum
-                found.append(fit)
+        for start in starts:
+            taste = fit_structure(problem, structure, start, iterations=TASTE, hopeless=hopeless)
+            if taste.objective < hopeless:
+                fit = best_of(problem, structure, [taste.theta], near)
+                if behind(fit) < 2 * CLEARLY:
+                    found.append(fit)
+                    break
     return found
 
 
@@ -319,11 +327,28 @@ def _holds(fit: Fit, plain: Structure) -> bool:
 
 def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     """Starts from fits with one pole fewer."""
+    if structure.dc_zeros > 1:
+        return [start for fit in fits for start in _high_passes(fit)]
     return [
         with_pole(fit.structure, fit.theta, _PARTNER * scale_of(fit))
         for fit in fits
         if one_more_pole(fit.structure) == structure
     ]
+
+
+def _high_passes(fit: Fit) -> list[Real]:
+    """Start of a second-order high pass that departs from a constant as a first-order fit does.
+
+    At high frequencies, 1 - 1/(Ts) describes either. The rough response hardly shows a corner near
+    the end of the band, where it leaks.
+    """
+    if fit.structure.order != 1 or fit.structure.zeros != 1:
+        return []
+    below, above = fit.denominator, fit.numerator
+    rate = 1.0 / below[1] - (above[0] / above[1] if above[1] else np.inf)
+    if not rate > 0.0:
+        return []
+    return [np.array([fit.delay, np.log(2.0 / rate), 0.5])]
 
 
 def best_of(

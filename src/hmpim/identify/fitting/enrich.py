@@ -44,6 +44,7 @@ RICH: tuple[StructureName, ...] = (
     "washout",
     "band_pass",
     "washout_second_order",
+    "second_order_high_pass",
 )
 MODES: tuple[StructureName, ...] = tuple(
     name for name, structure in STRUCTURES.items() if structure.parallel

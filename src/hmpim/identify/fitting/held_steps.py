@@ -3,7 +3,9 @@
 If the numerator has the denominator's degree, the output jumps with a held input. Samples then do
 not distinguish a fraction of a sample of delay from a change of the numerator, and the likelihood
 jumps from one whole sample to the next. So the delay stays in the middle of its sample, the
-neighbouring samples are tried one by one, and figures are read at both ends of the best one.
+neighbouring samples are tried one by one, and figures are read at both ends of the best one. Only
+where the structure leaves the numerator fewer coefficients than there are poles, as in a
+second-order high pass, the fraction remains distinguishable, and the delay moves in its sample.
 """
 
 from dataclasses import replace
@@ -20,6 +22,9 @@ __all__ = ["at_ends", "in_whole_samples", "kept_in_sample", "steps_through"]
 _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
 
+_INSIDE = 1e-6
+"""The same for a delay that moves in its sample: the likelihood jumps at the ends."""
+
 _FORGOTTEN = 1e-10
 """Share of a state that remains after part of a sample, below which it is unobservable."""
 
@@ -32,18 +37,26 @@ def steps_through(structure: Structure, *, held: bool) -> bool:
 
 
 def in_whole_samples(structure: Structure, *, held: bool) -> bool:
-    """Whether samples fix a delay to one sample: of a held input, if the output steps with it."""
-    return held and (structure.name == "static" or steps_through(structure, held=True))
+    """Whether samples fix a delay to one sample and no closer.
+
+    So they do where the output steps with a held input, unless the numerator is too short to
+    imitate a fraction of a sample.
+    """
+    short = structure.zeros - structure.dc_zeros + 1 < structure.order
+    stepped = steps_through(structure, held=True) and not short
+    return held and (structure.name == "static" or stepped)
 
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:
-    """The problem with the delay fixed to the middle of its sample."""
+    """The problem with the delay kept in its sample, in the middle if no fraction is known."""
+    held = problem.source.degree == 0
     stated = problem.shortest_delay == problem.longest_delay
-    if stated or not steps_through(structure, held=problem.source.degree == 0):
+    if stated or not steps_through(structure, held=held):
         return problem
     within = np.clip(theta[0], problem.shortest_delay, problem.longest_delay)
-    middle = float(np.floor(within)) + 0.5
-    return replace(problem, shortest_delay=middle, longest_delay=middle)
+    room = 0.5 if in_whole_samples(structure, held=held) else _INSIDE
+    low = float(np.floor(within))
+    return replace(problem, shortest_delay=low + room, longest_delay=low + 1.0 - room)
 
 
 def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real, Real]]:

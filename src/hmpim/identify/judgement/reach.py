@@ -159,7 +159,8 @@ def integrator(evidence: Evidence) -> Iterator[Finding]:
     """Say which figures do not exist for an integrator or a zero at DC."""
     structure = evidence.joint.best.fit.structure
     if structure.dc_zeros:
-        why, scale = "A constant input does not move the output", "output per rate of the input"
+        rate = "rate" if structure.dc_zeros == 1 else "acceleration"
+        why, scale = "A constant input does not move the output", f"output per {rate} of the input"
     elif structure.integrators:
         why, scale = "The output integrates the input", "output's rate per input"
     else:

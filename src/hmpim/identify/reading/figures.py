@@ -41,7 +41,8 @@ def units_of(structure: Structure, units: tuple[str, str]) -> dict[str, str]:
     if structure.integrators:
         gain = f"{gain or '1'}/s"
     if structure.dc_zeros:
-        gain = f"{gain}*s" if gain else "s"
+        time = "s" if structure.dc_zeros == 1 else f"s^{structure.dc_zeros}"
+        gain = f"{gain}*{time}" if gain else time
     return {
         **FIXED_UNITS,
         "damping_ratio": "",

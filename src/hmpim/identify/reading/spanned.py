@@ -18,7 +18,7 @@ from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER, SEEN
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import adjusted_for_pole, as_if_hidden, as_if_zero
-from hmpim.identify.fitting.held_steps import at_ends, steps_through
+from hmpim.identify.fitting.held_steps import at_ends, in_whole_samples
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
@@ -180,7 +180,8 @@ def spanned(
 def _ends(trial: Trial) -> list[Fit]:
     """Fits with the delay at either end of its sample, if only that sample is known."""
     fit = trial.fit
-    if not steps_through(fit.structure, held=trial.intersample == "zoh"):
+    held = trial.intersample == "zoh"
+    if not (fit.structure.order and in_whole_samples(fit.structure, held=held)):
         return []
     found = at_ends(fit.structure, fit.theta, fit.linear)
     return [replace(fit, theta=theta, linear=linear) for theta, linear in found]
