@@ -377,7 +377,10 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
     rest = pairs.residual()
-    whitening = whitening_of(rest)
+    # Couplings pass through the axis that the strongest input drives.
+    driven = likeness(inputs[pairs.strong[0]], contribution(best), pairs.y.size // 2 - 1)
+    others = [inputs[j] for j in weak]
+    whitening = whitening_of(rest, others, late=driven.lag)
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
@@ -398,4 +401,4 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
         while pairs.together(whitening, drop=names is structures):
             pass
         rest = pairs.residual()
-        whitening = whitening_of(rest)
+        whitening = whitening_of(rest, others, late=driven.lag)

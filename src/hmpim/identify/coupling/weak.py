@@ -9,14 +9,16 @@ at DC. The one with the smallest criterion of H. Akaike (IEEE Trans. Autom. Cont
 chosen: it keeps a barely significant pole, and so the wider error bars.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Real, averaged
+from hmpim.identify.arrays import Complex, Real, averaged
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
-from hmpim.identify.fitting.candidates import nested
+from hmpim.identify.fitting.candidates import in_best_sample, nested
 from hmpim.identify.fitting.course import bridged
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -42,6 +44,9 @@ _NARROWEST = 10
 _FLOOR = 1e-8
 """Smallest power of the noise, relative to its mean."""
 
+_ALIKE = 1e-6
+"""Least share of the greatest power at which an input, or a difference of two, is seen."""
+
 _TASTE = 4
 _STEPS = 25
 
@@ -50,11 +55,12 @@ _EARLIEST = -1.0
 """Smallest delay of a coupling, in samples: causal, within the error of time stamps."""
 
 
-def whitening_of(residual: Real) -> Real | None:
+def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0.0) -> Real | None:
     """Gain at each bin that whitens a residual, (n // 2 + 1,); None if it is white already.
 
     The inverse root of its periodogram, averaged over a tenth of the frequency on either side. The
-    residual, (n,), is 0 where a sample does not count; whitened, it has unit variance.
+    residual, (n,), is 0 where a sample does not count; whitened, it has unit variance. What follows
+    any of the `inputs`, each (n,), `late` by about so many samples, is no noise: it is left out.
 
     Examples
     --------
@@ -69,8 +75,38 @@ def whitening_of(residual: Real) -> Real | None:
     power = np.abs(scipy.fft.rfft(residual - residual.mean())) ** 2 / residual.size
     power[0] = power[1]
     bins = np.arange(power.size)
-    smooth = averaged(power, np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST))
+    reach = np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST)
+    smooth = _noise(residual, inputs, late, reach) if inputs else averaged(power, reach)
     return np.asarray(1.0 / np.sqrt(np.maximum(smooth, _FLOOR * power.mean())))
+
+
+def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[np.int64]) -> Real:
+    """Power of a residual at each bin, (m,), without its regression on inputs around it.
+
+    One complex gain for each input and window (local rational methods of degree 0: Pintelon and
+    Schoukens, System Identification, 2nd ed., Wiley 2012, ch. 7). The delay changes little over a
+    window once the inputs are moved by it.
+    """
+    centres = [0]
+    while centres[-1] < reach.size - 1:
+        centres.append(min(centres[-1] + max(int(reach[centres[-1]]) // 4, 1), reach.size - 1))
+    begin = np.maximum(centres - reach[centres], 1)
+    end = np.minimum(centres + reach[centres] + 1, reach.size)
+    turn = np.exp(-2j * np.pi * late / residual.size * np.arange(reach.size))
+    moved = [scipy.fft.rfft(u - u.mean()) * turn for u in inputs]
+    answer = scipy.fft.rfft(residual - residual.mean())
+
+    def around(first: Complex, second: Complex) -> Complex:
+        total = np.concatenate([[0.0], np.cumsum(first.conj() * second)])
+        return np.asarray(total[end] - total[begin])
+
+    gram = np.array([[around(u, v) for v in moved] for u in moved]).transpose(2, 0, 1)
+    cross = np.array([around(u, answer) for u in moved]).T
+    gains = np.einsum("kij,kj->ki", np.linalg.pinv(gram, rcond=_ALIKE, hermitian=True), cross)
+    rest = around(answer, answer).real - np.einsum("ki,ki->k", cross.conj(), gains).real
+    freedom = np.maximum(end - begin - len(moved), 1)
+    power = rest / freedom / residual.size
+    return np.asarray(np.interp(np.arange(reach.size), centres, power))
 
 
 def coupling_fit(
@@ -105,7 +141,7 @@ def coupling_fit(
         best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
             best = fit_structure(problem, structure, best.theta, iterations=_STEPS)
-        fits.append(best)
+        fits.append(in_best_sample(problem, best))
     trials = tuple(
         Trial(intersample=intersample, fit=fit, criterion=_akaike(problem, fit)) for fit in fits
     )

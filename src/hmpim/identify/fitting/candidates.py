@@ -381,8 +381,7 @@ def best_of(
         if fit.converged and fit.is_white:
             break
     best = min(tried, key=lambda fit: fit.objective)
-    if steps_through(structure, held=problem.source.degree == 0):
-        best = _best_sample(problem, best)
+    best = in_best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
     count = problem.counted * leading.share
@@ -393,8 +392,10 @@ def best_of(
     return refit(problem, best, precision=precision, hopeless=hopeless)
 
 
-def _best_sample(problem: Problem, best: Fit) -> Fit:
-    """Move the delay one sample earlier or later while that improves the fit."""
+def in_best_sample(problem: Problem, best: Fit) -> Fit:
+    """Move the delay one sample earlier or later while that improves a fit kept in its sample."""
+    if not steps_through(best.structure, held=problem.source.degree == 0):
+        return best
     for step in (-1.0, 1.0):
         while True:
             start = np.append(best.theta[0] + step, best.theta[1:])

@@ -48,8 +48,8 @@ _FAST = 9
 def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual still follows the input.
 
-    From 3 % of the output on, all figures are in doubt. If less than that is a large part of the
-    residual, the noise is in doubt, and each figure that may move by 1 %: a figure moves at most by
+    From 3 % of the output on, all figures of the model are in doubt. The noise is from a tenth of
+    the residual's power on; so is then each figure that may move by 1 %: a figure moves at most by
     its deviation, for white noise, times the root of this part over the noise (Cauchy-Schwarz).
     """
     misfit = evidence.misfit
@@ -59,8 +59,10 @@ def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     name = structure_in_words(evidence.joint.best.fit.structure.name)
     large, moved = owed > TOLERATED, MODELLED
     much = misfit.share > 2 * FEW  # otherwise the noise is off by a few per cent at most
-    if much and not large:
-        some = owed > WORTH and misfit.share > PART
+    if large and not much:
+        moved = tuple(name for name in MODELLED if name != "noise_std")
+    elif not large:
+        some = much and owed > WORTH and misfit.share > PART
         moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
     yield Finding(
         code="lack_of_fit",
