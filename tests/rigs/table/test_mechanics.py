@@ -1,4 +1,4 @@
-"""The rigid bodies: energy, symmetry, couplings, derivatives of a step."""
+"""The rigid bodies: energy, symmetry, couplings, derivatives of a tick."""
 
 import itertools
 import math
@@ -22,14 +22,14 @@ TICK = 5e-4
 angles = st.lists(st.floats(-0.7, 0.7), min_size=5, max_size=5).map(np.array)
 
 
-def plant(*, friction=False, timestep=TICK, base=None, uut="bracket", target="projector"):
+def plant(*, friction=False, tick=TICK, base=None, uut="bracket", target="projector"):
     return build(
         FIG_4,
         uut=load_named("uut", uut),
         target=load_named("target", target),
         base=Base() if base is None else base,
         friction=friction,
-        timestep=timestep,
+        tick=tick,
     )
 
 
@@ -153,12 +153,12 @@ def test_a_table_at_rest_stays_at_rest():
     data, _ = p.at_rest(np.array([0.3, -0.2, 0.4, 0.1, -0.3]))
     before = data.qpos.copy()
     for _ in range(2000):
-        mj.mj_step(p.model, data)
+        p.advance(data)
     assert np.abs(data.qpos - before).max() < 1e-9
 
 
 @pytest.mark.parametrize("at", [np.zeros(5), np.array([0.4, 0.5, -0.3, 0.2, 0.3])])
-def test_derivatives_of_a_step_against_differences_of_steps(at):
+def test_derivatives_of_a_tick_against_differences_of_ticks(at):
     p = plant()
     step = p.step(at)
     nv, na = p.model.nv, p.model.na
@@ -169,7 +169,7 @@ def test_derivatives_of_a_step_against_differences_of_steps(at):
         data.qvel += state[nv : 2 * nv]
         data.act += state[2 * nv :]
         data.ctrl[:] = torque + control
-        mj.mj_step(p.model, data)
+        p.advance(data)
         return np.concatenate((data.qpos, data.qvel, data.act))
 
     size = 2 * nv + na

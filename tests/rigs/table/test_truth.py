@@ -63,7 +63,7 @@ def test_feedforward_raises_the_bandwidth():
         p, pv, pva = (
             exact_bandwidth(MotionTable(), axis=axis, mode=mode) for mode in ("P", "PV", "PVA")
         )
-        assert 1.5 * p < pv < pva / 1.5
+        assert 1.4 * p < pv < pva / 1.4
 
 
 @pytest.mark.parametrize(

@@ -101,7 +101,7 @@ def close_loop(step: Step, gains: Gains, *, mode: CommandMode, tick: float) -> C
     Parameters
     ----------
     step : Step
-        Derivatives of the plant; one step is one tick.
+        Derivatives of the plant.
     gains : Gains
         Of the servos.
     mode : {'P', 'PV', 'PVA'}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import RigError
 from hmpim.rigs.table.axes import AXES, AxisName, AxisSpec, CommandMode
-from hmpim.rigs.table.plant import BASE, ORDER, Plant, mujoco
+from hmpim.rigs.table.plant import BASE, ORDER, Plant
 from hmpim.rigs.table.servo import RESERVE, Gains, feedforward
 
 __all__ = ["History", "Motion", "Timing"]
@@ -25,7 +25,7 @@ class Timing:
     Parameters
     ----------
     tick : float
-        Period of the controller, and step of the integration, s.
+        Period of the controller, s.
     hold, late : int
         Ticks for which a command is held, and by which it comes late.
     """
@@ -80,7 +80,7 @@ class Motion:
     Parameters
     ----------
     plant : Plant
-        The mechanics; its step is the controller's tick.
+        The mechanics.
     axes : tuple of AxisSpec
         For their limits.
     gains : Gains
@@ -113,7 +113,7 @@ class Motion:
         noise_std: float,
         rng: np.random.Generator,
     ) -> None:
-        self._step, self._model = mujoco().mj_step, plant.model
+        self._plant = plant
         self._data, self._trim = plant.at_rest(start)
         self._timing, self._resolution = timing, resolution
         self._noise_std, self._rng = noise_std, rng
@@ -196,7 +196,7 @@ class Motion:
         )
 
     def _tick(self, rate: FloatArray, measured: FloatArray, push: FloatArray) -> None:
-        """One tick of the controller: rate wanted to torque, and one step of the mechanics."""
+        """One tick of the controller: rate wanted to torque, and the mechanics."""
         least, most = self._rate
         rate = np.minimum(np.maximum(rate, least, out=rate), most, out=rate)
         rate -= measured
@@ -208,7 +208,7 @@ class Motion:
         demand += self._trim
         least, most = self._torque
         np.minimum(np.maximum(demand, least, out=demand), most, out=self._data.ctrl)
-        self._step(self._model, self._data)
+        self._plant.advance(self._data)
 
 
 def _open_interlock(rate: FloatArray, overspeed: FloatArray, seconds: float) -> None:

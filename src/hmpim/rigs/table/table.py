@@ -218,7 +218,7 @@ class MotionTable(Simulated):
             target=load_named("target", self.target_load),
             base=self.base,
             friction=self.friction,
-            timestep=1.0 / self.controller_rate,
+            tick=1.0 / self.controller_rate,
         )
 
     @property

@@ -62,7 +62,7 @@ def tune(axes: tuple[AxisSpec, ...], *, base: Base, tick: float, hold: int, late
         target=load_named("target", "acceptance"),
         base=base,
         friction=False,
-        timestep=tick,
+        tick=tick,
     )
     middle = np.zeros(5)
     step, inertia = plant.step(middle), plant.inertia(middle)
