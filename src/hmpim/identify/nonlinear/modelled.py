@@ -189,7 +189,7 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
     changes: list[Real] = []
     nearest, least, last, counted = None, PART, np.inf, problem.counted
     ever: Mask | None = None  # samples that have counted since the fit was last no nearer
-    for _ in range(TURNS):
+    for turn in range(TURNS):
         data = with_row(problem, one)
         if data.counted < _FEWEST:
             break
@@ -200,8 +200,9 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
             nearest, least = one, deviance
         if least < MATERIAL:
             break
-        if deviance > last and abs(data.counted - counted) > FEW * counted:
-            tried.clear()  # many samples that wait come and go
+        many = deviance > last and abs(data.counted - counted) > FEW * counted
+        if many or turn == TURNS // 2:
+            tried.clear()  # many samples that wait come and go, or a few again and again
             changes.clear()
             ever = one.counts
         last, counted = deviance, data.counted
