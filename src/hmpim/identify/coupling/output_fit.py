@@ -278,6 +278,9 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
+        own = pairs.fits.get(i)
+        if own is not None and own.related and _power(own) < _power(tried[i]):
+            continue  # it is described better as a weak one
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -328,6 +331,11 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     """Inputs that may be the strongest: a delayed copy of one correlates as well."""
     most = max(share.values(), default=0.0)
     return [j for j, one in share.items() if one >= NEARLY * most]
+
+
+def _power(fit: JointFit) -> float:
+    """Mean square of a fit's residual."""
+    return fit.best.fit.cost / fit.problem.counted
 
 
 def _is_large(fit: JointFit) -> bool:

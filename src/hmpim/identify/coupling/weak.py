@@ -44,6 +44,9 @@ _NARROWEST = 10
 _FLOOR = 1e-8
 """Smallest power of the noise, relative to its mean."""
 
+_PARTS = 4
+"""Parts of a window on either side of its middle."""
+
 _ALIKE = 1e-6
 """Least share of the greatest power at which an input, or a difference of two, is seen."""
 
@@ -87,25 +90,25 @@ def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[n
     Schoukens, System Identification, 2nd ed., Wiley 2012, ch. 7). The delay changes little over a
     window once the inputs are moved by it.
     """
-    centres = [0]
-    while centres[-1] < reach.size - 1:
-        centres.append(min(centres[-1] + max(int(reach[centres[-1]]) // 4, 1), reach.size - 1))
-    begin = np.maximum(centres - reach[centres], 1)
-    end = np.minimum(centres + reach[centres] + 1, reach.size)
+    edges = [1]
+    while edges[-1] < reach.size:
+        edges.append(min(edges[-1] + max(int(reach[edges[-1]]) // _PARTS, 1), reach.size))
     turn = np.exp(-2j * np.pi * late / residual.size * np.arange(reach.size))
     moved = [scipy.fft.rfft(u - u.mean()) * turn for u in inputs]
     answer = scipy.fft.rfft(residual - residual.mean())
+    window = np.ones(2 * _PARTS + 1)  # parts, as differences of running sums would cancel
 
     def around(first: Complex, second: Complex) -> Complex:
-        total = np.concatenate([[0.0], np.cumsum(first.conj() * second)])
-        return np.asarray(total[end] - total[begin])
+        parts = np.add.reduceat(first.conj() * second, edges[:-1])
+        return np.asarray(np.convolve(parts, window, "same"), dtype=np.complex128)
 
     gram = np.array([[around(u, v) for v in moved] for u in moved]).transpose(2, 0, 1)
     cross = np.array([around(u, answer) for u in moved]).T
     gains = np.einsum("kij,kj->ki", np.linalg.pinv(gram, rcond=_ALIKE, hermitian=True), cross)
     rest = around(answer, answer).real - np.einsum("ki,ki->k", cross.conj(), gains).real
-    freedom = np.maximum(end - begin - len(moved), 1)
-    power = rest / freedom / residual.size
+    freedom = np.convolve(np.diff(edges), window, "same") - len(moved)
+    power = rest / np.maximum(freedom, 1.0) / residual.size
+    centres = 0.5 * (np.array(edges[:-1]) + np.array(edges[1:]) - 1.0)
     return np.asarray(np.interp(np.arange(reach.size), centres, power))
 
 
