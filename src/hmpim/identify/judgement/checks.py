@@ -18,6 +18,7 @@ from hmpim.record import Finding
 __all__ = ["CHECKS", "Check", "attempt", "judge"]
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 Check = Callable[[Evidence], Iterable[Finding]]
 """A function from the evidence to findings."""
@@ -86,9 +87,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     if evidence.is_without_noise:
         checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
-    nothing: tuple[Finding, ...] = ()
     for check in checks:
-        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), nothing)
+        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), ())
         found += [*made, *failure]
     # Figures that are not given need no further remark.
     unknown = doubted(finding for finding in found if finding.code in UNKNOWN)
@@ -106,7 +106,7 @@ def _findings_of(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
     return tuple(check(evidence))
 
 
-def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
+def attempt(name: str, look: Callable[[], T], otherwise: U) -> tuple[T | U, tuple[Finding, ...]]:
     """Return what `look` returns; if it raises, return `otherwise` and a finding.
 
     Examples

@@ -22,13 +22,13 @@ _NEAR = 24
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """How much of the residual still follows the input."""
+    """How much of the residual still follows the input; by default nothing."""
 
     # of the residual's power, at all frequencies, explained by a smooth response to the input
     # within its band beyond what noise would explain; 0 when none
-    share: float
-    within: float  # the same, of the residual's power within the band
-    probability: float  # chance of so much, or more, if the model were right
+    share: float = 0.0
+    within: float = 0.0  # the same, of the residual's power within the band
+    probability: float = 1.0  # chance of so much, or more, if the model were right
 
 
 def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) -> Misfit:

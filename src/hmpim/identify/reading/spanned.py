@@ -22,7 +22,7 @@ from hmpim.identify.fitting.held_steps import at_ends, in_whole_samples
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT
+from hmpim.identify.result.groups import BANDWIDTHS, EVERY, MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW, ROUNDING, TWICE
 
 __all__ = [
@@ -40,10 +40,7 @@ _STEP = 1e-6
 
 _TINY = float(np.finfo(float).tiny)
 
-_FAST = (
-    *("natural_frequency", "damping_ratio"),
-    *("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db"),
-)
+_FAST = ("natural_frequency", "damping_ratio", *BANDWIDTHS)
 """Figures that grow without limit as a second pole becomes infinitely fast, bandwidths last."""
 
 

@@ -19,7 +19,7 @@ from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import check_channels, names_of, naming
 from hmpim.identify.result import Identification, PairIdentification, Parameters
 from hmpim.identify.result.digits import percent, plus_minus
-from hmpim.identify.result.groups import in_words
+from hmpim.identify.result.groups import BANDWIDTHS, in_words
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
@@ -31,9 +31,7 @@ _COMPARED = (
     "natural_frequency",
     "damping_ratio",
     "time_constant",
-    "bandwidth_phase90",
-    "bandwidth_phase90_without_delay",
-    "bandwidth_3db",
+    *BANDWIDTHS,
     "scale_factor",
     "delay",
 )

@@ -9,8 +9,7 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.noise.autoregression import spectrum_of_filter
-from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.statistics.beyond import UNDELAYED
+from hmpim.identify.statistics.beyond import TIMED
 from hmpim.identify.statistics.fit import Compressed, as_fitted, pulse
 from hmpim.identify.statistics.products import Responses
 from hmpim.identify.worth import FEW, MOST
@@ -88,5 +87,5 @@ def perhaps_software(evidence: Evidence) -> Iterator[Finding]:
         "has another delay and other bandwidths than one pole behind a held input. Identify "
         "the record itself, with intersample='sampled' if it is software.",
         severity="doubt",
-        parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
+        parameters=TIMED,
     )
