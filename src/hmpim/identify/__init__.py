@@ -1,7 +1,5 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.frf.local import local_response
-from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import same_at_levels
 from hmpim.identify.records.levels import (
@@ -70,7 +68,6 @@ __all__ = [
     "RepeatedParameter",
     "Repeats",
     "ResponseBandwidths",
-    "ResponseMatrix",
     "Statistics",
     "Trend",
     "Validation",
@@ -85,11 +82,9 @@ __all__ = [
     "identify_levels",
     "identify_repeats",
     "left_out",
-    "local_response",
     "measurable",
     "paper_analysis",
     "predict",
-    "response_matrix",
     "same_at_levels",
     "to_model",
     "validate",

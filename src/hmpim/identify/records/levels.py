@@ -16,7 +16,7 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
-from hmpim.identify.records.alike import check_channels, names_of, naming
+from hmpim.identify.records.alike import check_channels, each_named, names_of
 from hmpim.identify.result import Identification, PairIdentification, Parameters
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import BANDWIDTHS, in_words
@@ -201,10 +201,8 @@ def identify_levels(
     called = names_of(given, names)
     check_channels(given, called)
     linear = partial(identify, nonlinear="reported")
-    results = []
-    for name, record in zip(called, given, strict=True):
-        with naming(name):
-            results.append(linear(record, intersample=intersample, structures=structures))
+    alone = partial(linear, intersample=intersample, structures=structures)
+    results = each_named(alone, given, called)
     comparisons = []
     for pair in results[0].pairs:
         key = (pair.output, pair.input)
