@@ -91,15 +91,6 @@ def local_responses(
 
     The outputs, (k, n), have pure delays in s, (k,). All that depends on the input alone is
     computed once, and many records are fitted at once.
-
-    Examples
-    --------
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> y = np.stack([2 * u, 3 * np.concatenate((np.zeros(30), u[:-30]))])
-    >>> two = local_responses(u, y, 200.0, band=(0.1, 20.0), delays=np.array([0.0, 0.15]))
-    >>> [bool(np.allclose(np.abs(frf.response), k)) for frf, k in zip(two, (2.0, 3.0))]
-    [True, True]
     """
     if abs(u[-1] - u[0]) > MOST * np.ptp(u):
         u, outputs = np.diff(u, prepend=u[0]), np.diff(outputs, axis=-1, prepend=outputs[:, :1])

@@ -158,14 +158,6 @@ def unexplained_response(
     at the high end and still explain 99 % of the output's power. Here every group of bins has the
     same weight. Twice the share that noise alone would explain is subtracted. Delay and band are
     as for `misfit`.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> u = rng.standard_normal(2000)
-    >>> y = 2.0 * u
-    >>> round(unexplained_response(u, y, 0.1 * y, delay=0.0, band=(0.0, 0.5)), 3)
-    0.1
     """
     answers, delays = np.asarray(scipy.fft.rfft(np.stack([y, residual]))), np.full(2, delay)
     power, taken, total, width = _followed(

@@ -92,15 +92,8 @@ def identify_statistics(
 ) -> Identification:
     """Identify one pair from compressed records.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        From `hmpim.compress`.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
-        What the input does between its samples; by default as the statistics state it, or the
-        likeliest.
-    structures : tuple of str, optional
-        Structures to try; all by default. Integrators are tried in any case, and refused.
+    The input between its samples is by default as the statistics state it, or the likeliest, and
+    all structures are tried; integrators are tried in any case, and refused.
 
     Raises
     ------
