@@ -2,13 +2,7 @@
 
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import same_at_levels
-from hmpim.identify.records.levels import (
-    LevelComparison,
-    Levels,
-    Trend,
-    compare_levels,
-    identify_levels,
-)
+from hmpim.identify.records.levels import LevelComparison, Levels, Trend, identify_levels
 from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
 from hmpim.identify.records.repeats import identify_repeats
 from hmpim.identify.result import (
@@ -73,7 +67,6 @@ __all__ = [
     "Validation",
     "Verdict",
     "compare",
-    "compare_levels",
     "compress",
     "excited_band",
     "gain_and_phase",

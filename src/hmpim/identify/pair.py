@@ -130,8 +130,7 @@ def _pair(
         highest=min(band[1], aligned.fs / 2),
         delay_correlation=paper.delay,
         known_covariance=covariance,
-        input_unit=source.unit,
-        output_unit=output.unit,
+        units=units,
     )
     response = (
         _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]

@@ -54,8 +54,7 @@ def read_parameters(
     highest: float,
     delay_correlation: float | None,
     known_covariance: Real | None = None,
-    input_unit: str,
-    output_unit: str,
+    units: tuple[str, str],
 ) -> Readings:
     """Turn the chosen fit into estimates.
 
@@ -93,9 +92,9 @@ def read_parameters(
             fit.cost,
             freedom=max(joint.problem.counted - vector.size, 1),
             share=joint.effective_share * steadiness(weighed.as_loud(residual)),
-            unit=output_unit,
+            unit=units[1],
         ),
-        units=(input_unit, output_unit),
+        units=units,
     )
     return Readings(
         parameters=replace(parameters, delay_correlation=from_lag(delay_correlation, fs)),
