@@ -148,7 +148,7 @@ def whole_pairs(
     bandwidths = [name for name in BANDWIDTHS if name in fleet.names]
     columns = {name: column.copy() for name, column in fit.columns.items()}
     for group in fit.groups:
-        some = group.some
+        some, mode = group.some, group.fit.member.intersample
         costs = simpler[some]
         quiet = are_quiet(fleet, group, outputs[some], simpler=costs, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
@@ -168,16 +168,14 @@ def whole_pairs(
             vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
             system = system_of(fleet.structure, vector, fleet.fs)
             own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
-            crossings = response_bandwidths(
-                response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
-            )
+            crossings = response_bandwidths(response, system, own, fs=fleet.fs, intersample=mode)
             if disagreeing(crossings, own):
                 continue
             pair = PairIdentification(
                 input=names[0],
                 output=names[1],
                 structure=fleet.structure.name,
-                intersample=group.fit.member.intersample,
+                intersample=mode,
                 fit_percent=float(fit.fit_percent[i]),
                 parameters=replace(
                     parameters_of(columns, i), delay_correlation=from_lag(paper.delay, fleet.fs)

@@ -15,7 +15,7 @@ from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import UNKNOWN, doubted
 from hmpim.record import Finding
 
-__all__ = ["CHECKS", "Check", "attempt", "judge"]
+__all__ = ["CHECKS", "COMPRESSED", "Check", "attempt", "judge"]
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -68,6 +68,13 @@ SAMPLED: tuple[Check, ...] = (
     residual.noise_colour_of,
 )
 """The checks for software, which has neither poles beyond the band nor a clock."""
+
+COMPRESSED: tuple[Check, ...] = (
+    *(reach.initial_transient, residual.lack_of_fit, not_converged, weak_excitation, weak_delay),
+    *(reach.fast_mode, reach.natural_frequency_beyond, reach.integrator, reach.beyond_band),
+    *(other_order, missed_pole, other_intersample, wide_span, reach.negative_delay),
+)
+"""The checks for statistics, which need no samples."""
 
 _OF_THE_RESIDUAL: tuple[Check, ...] = (
     *(residual.lack_of_fit, residual.coloured_noise, residual.changing_noise),

@@ -15,7 +15,7 @@ from hmpim.identify.statistics.products import Responses
 from hmpim.identify.worth import FEW, MOST
 from hmpim.record import Finding
 
-__all__ = ["cut_response", "drift_or_noise", "perhaps_software"]
+__all__ = ["LIMITS"]
 
 _FREQUENCIES = 2_000
 _SLOWEST = 1e-7
@@ -89,3 +89,7 @@ def perhaps_software(evidence: Evidence) -> Iterator[Finding]:
         severity="doubt",
         parameters=TIMED,
     )
+
+
+LIMITS = (drift_or_noise, cut_response, perhaps_software)
+"""The checks for statistics alone."""
