@@ -54,7 +54,7 @@ def naming(name: str, *, arguments: bool = False) -> Iterator[None]:
 def each_named(
     function: Callable[[Record], R], records: Sequence[Record], called: Sequence[str]
 ) -> list[R]:
-    """Return a function of each record; what it refuses is said of that record by its name."""
+    """Apply a function to each record; a refusal begins with what the record is called."""
     found = []
     for name, record in zip(called, records, strict=True):
         with naming(name):

@@ -236,7 +236,7 @@ def _only(structure: str) -> list[str]:
 def compare_levels(
     results: Sequence[Parameters], amplitudes: Sequence[float], *, unit: str = ""
 ) -> LevelComparison:
-    """Compare what was identified at several amplitudes, in any order; `unit` is theirs.
+    """Compare what was identified at several amplitudes, in any order, all in one unit.
 
     Examples
     --------
