@@ -1,16 +1,8 @@
 """Identification: from a record to every parameter, each with its error bar (paper, section IV)."""
 
-from hmpim.identify.frf.local import local_response
-from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
 from hmpim.identify.identify import identify
 from hmpim.identify.records.alike import same_at_levels
-from hmpim.identify.records.levels import (
-    LevelComparison,
-    Levels,
-    Trend,
-    compare_levels,
-    identify_levels,
-)
+from hmpim.identify.records.levels import LevelComparison, Levels, Trend, identify_levels
 from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
 from hmpim.identify.records.repeats import identify_repeats
 from hmpim.identify.result import (
@@ -70,13 +62,11 @@ __all__ = [
     "RepeatedParameter",
     "Repeats",
     "ResponseBandwidths",
-    "ResponseMatrix",
     "Statistics",
     "Trend",
     "Validation",
     "Verdict",
     "compare",
-    "compare_levels",
     "compress",
     "excited_band",
     "gain_and_phase",
@@ -85,11 +75,9 @@ __all__ = [
     "identify_levels",
     "identify_repeats",
     "left_out",
-    "local_response",
     "measurable",
     "paper_analysis",
     "predict",
-    "response_matrix",
     "same_at_levels",
     "to_model",
     "validate",

@@ -122,13 +122,12 @@ def _fit_and_look_for_rows(
     question: Question, seen: Imperfections, begun: Course | None = None
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
-    steady = question.exact or question.intersample == "sampled"
-    fit_drift = None if steady else partial(_plain_beside_drift, question, seen)
+    software = question.intersample == "sampled"
+    fit_drift = None if software else partial(_plain_beside_drift, question, seen)
     fitted = fit_once(question, seen, question.structures, begun=begun, fit_drift=fit_drift)
-    sampled = len(fitted.fits) > 1 and question.intersample == "sampled"
     if fitted.drifting is not None or fitted.fits[0].silent:
         return fitted
-    if question.swapped or question.exact or sampled:
+    if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
     return _WithRows(question, seen, fitted).found()
 
@@ -290,13 +289,8 @@ def imperfections_of(
 def _begin(question: Question, seen: Imperfections) -> Course | None:
     """Plain fits of one input; None for loops, software and where no other structures are tried."""
     alone = len(question.aligned.inputs) == 1 and question.instrument is None
-    if (
-        not alone
-        or question.swapped
-        or question.exact
-        or question.intersample == "sampled"
-        or question.plain == question.structures
-    ):
+    software = question.intersample == "sampled"
+    if not alone or software or question.swapped or question.plain == question.structures:
         return None
     return turn_ahead(started(question, seen))
 

@@ -1,5 +1,6 @@
 """The description of one output and one input, made from the joint fit."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,8 +83,7 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
         return Described(pairs=(_unrelated(question, 0, said),))
     counted = seen.counting(np.asarray(output.valid), aligned.fs)
     responses = responses_of(aligned, output, counted, fitted, inputs)
-    none: tuple[Finding, ...] = ()
-    more, _ = attempt("misfit", lambda: unfound(fitted, responses, inputs), none)
+    more, _ = attempt("misfit", lambda: unfound(fitted, responses, inputs), ())
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
@@ -130,48 +130,39 @@ def _pair(
         highest=min(band[1], aligned.fs / 2),
         delay_correlation=paper.delay,
         known_covariance=covariance,
-        input_unit=source.unit,
-        output_unit=output.unit,
+        units=units,
     )
     response = (
         _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
     )
-    none: tuple[Bend, ...] = ()
     moves, unmoved = attempt(
-        "bends", lambda: possible_bends(question, found, joint, i, plain, said), none
+        "bends", lambda: possible_bends(question, found, joint, i, plain, said), ()
     )
     from_response, unread = attempt(
         "response_bandwidths",
         lambda: _bandwidths(question, joint, readings, response, i, matrix),
         ResponseBandwidths(),
     )
-    left, untested = attempt(
-        "misfit",
-        lambda: _left(question, joint, i, matrix),
-        Misfit(share=0.0, within=0.0, probability=1.0),
-    )
+    left, untested = attempt("misfit", lambda: _left(question, joint, i, matrix), Misfit())
     evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
-    bent = 0.0
+    evidence = replace(evidence, held=found.hold is not None)
     if inspection is not None and said and bending is None:
-        bent = inspection.summary.nonlinear
-    evidence = replace(
-        evidence, nonlinear=max(bent, evidence.nonlinear), held=found.hold is not None
-    )
+        bent = max(inspection.summary.nonlinear, evidence.nonlinear)
+        evidence = replace(evidence, nonlinear=bent)
     parameters, seen = with_imperfections(evidence.spanned, found, censored, output.unit)
     known = {finding.code for finding in seen}
     findings = (
-        *_found_before(question, source.unit),
+        *_of_the_question(question, source.unit),
         *judge(evidence),
         *seen,
         *(finding for finding in said if finding.code not in known),
-        *_disturbances(question, joined, i, units, white=readings.white),
+        *_of_the_model(question, joined, i, units, white=readings.white),
         *(*unseen, *unmoved, *unread, *untested),
     )
-    fit = joint.best.fit
+    fit, spread = joint.best.fit, _spread(joint)
     gaining, disturbance = joined.gaining, joined.disturbance
     course = None if gaining is None or not gaining.taken else gaining.course
     numerator, denominator = coefficients_of(readings.system)
-    spread = _spread(joint)
     return PairIdentification(
         input=source.name,
         output=output.name,
@@ -212,28 +203,25 @@ def _summary(
     return replace(summary, kinds=(modelled.kind,), size=modelled.estimate(units))
 
 
-def _found_before(question: Question, unit: str) -> list[Finding]:
+def _of_the_question(question: Question, unit: str) -> Iterator[Finding]:
     """Findings about the question itself: a loop's reference, a command of limited speed."""
-    found = [] if question.instrument is None else [question.instrument.finding()]
+    if question.instrument is not None:
+        yield question.instrument.finding()
     if question.limited is not None:
-        found.append(speed_finding(question.limited, question.aligned.fs, unit))
-    return found
+        yield speed_finding(question.limited, question.aligned.fs, unit)
 
 
-def _disturbances(
+def _of_the_model(
     question: Question, joined: OutputFit, i: int, units: tuple[str, str], *, white: bool
-) -> list[Finding]:
+) -> Iterator[Finding]:
     """Findings about a drift, hum and a nonlinearity that the model includes."""
-    fs, unit = question.aligned.fs, question.output.unit
-    found: list[Finding] = []
+    fs, bending = question.aligned.fs, joined.bending_of(i)
     if joined.drifting is not None:
-        found += drift_findings(joined.drifting, fs, unit, white=white)
+        yield from drift_findings(joined.drifting, fs, units[1], white=white)
     if joined.humming is not None:
-        found.append(hum_finding(joined.humming, fs, unit))
-    bending = joined.bending_of(i)
+        yield hum_finding(joined.humming, fs, units[1])
     if bending is not None:
-        found.append(modelled_finding(bending, units))
-    return found
+        yield modelled_finding(bending, units)
 
 
 def _evidence(
@@ -392,8 +380,7 @@ def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> 
 
 def _spread(joint: JointFit) -> float:
     """Sum of squares of the samples that count about their mean."""
-    problem = joint.problem
-    y = problem.y if problem.valid is None else problem.y[problem.valid]
+    y = joint.problem.counting(joint.problem.y)
     away = y - y.mean()
     return float(away @ away)
 

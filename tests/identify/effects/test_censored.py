@@ -241,7 +241,7 @@ def test_a_noise_taken_far_too_loud_leads_to_no_endless_step(source, clean, trut
     """Under such a noise samples just inside the level bend the likelihood upwards."""
     levels = detect_saturation(np.clip(clean, None, 0.5))
     problem = Problem(source=source, y=np.clip(clean, None, 0.5), valid=None, longest_delay=1000.0)
-    data = censored._data(problem, levels, None)
+    data = censored._data(problem, levels, None, None)
     loud = next(
         state
         for log_sigma in np.arange(0.0, 8.0, 0.25)

@@ -118,7 +118,7 @@ def delays(u, second, count):
     for seed in range(count):
         joint = fitted(u, noisy(clean, 0.02, seed), "static", "first_order", "second_order")
         read = read_parameters(
-            joint, fs=1.0, highest=0.1, delay_correlation=None, input_unit="", output_unit=""
+            joint, fs=1.0, highest=0.1, delay_correlation=None, units=("", "")
         ).parameters
         for told, parameters in (
             (alone, read),

@@ -48,7 +48,7 @@ def problem(u, y, mode="bandlimited") -> Problem:
 
 def read(joint, highest=20.0):
     return read_parameters(
-        joint, fs=FS, highest=highest, delay_correlation=None, input_unit="", output_unit=""
+        joint, fs=FS, highest=highest, delay_correlation=None, units=("", "")
     ).parameters
 
 

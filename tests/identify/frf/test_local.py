@@ -1,5 +1,4 @@
 import os
-from typing import Any
 
 import numpy as np
 import pytest
@@ -7,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from hmpim.errors import ArgumentError, RecordError
+from hmpim.errors import ArgumentError
 from hmpim.identify.frf.local import local_response, local_responses
 from tests_support import examples
 
@@ -206,30 +205,15 @@ def test_short_records_and_wild_delays_give_finite_numbers(samples: int, delay: 
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("band", "message"),
     [
-        ({"delay": float("inf")}, "delay is inf s"),
-        ({"delay": float("nan")}, "delay is nan s"),
-        ({"points": 0}, "points is 0"),
-        ({"band": (5.01, 5.02)}, "no bin in it, only multiples of 0.1 Hz"),
-        ({"band": (0.1, 101.0)}, "band is"),
+        ((5.01, 5.02), "no bin in it, only multiples of 0.1 Hz"),
+        ((0.1, 101.0), "band is"),
     ],
 )
-def test_bad_options_are_refused(change: dict[str, object], message: str) -> None:
-    options: dict[str, Any] = {"band": BAND} | change
+def test_bad_bands_are_refused(band: tuple[float, float], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
-        local_response(U, U, FS, **options)
-
-
-def test_bad_records_are_refused() -> None:
-    with pytest.raises(RecordError, match="the record has 15 samples"):
-        local_response(U[:15], U[:15], FS, band=(20.0, 60.0))
-    with pytest.raises(RecordError, match=r"u is constant at 0\.1"):
-        local_response(np.full(777, 0.1), U[:777], FS, band=BAND)
-    with pytest.raises(RecordError, match="u has 2000 samples and y has 1999"):
-        local_response(U, U[:-1], FS, band=BAND)
-    with pytest.raises(ArgumentError, match="fs is 0"):
-        local_response(U, U, 0.0, band=BAND)
+        local_response(U, U, FS, band=band)
 
 
 def test_many_outputs_at_once_say_what_each_says_alone():

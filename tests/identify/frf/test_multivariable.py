@@ -202,52 +202,31 @@ U = np.stack((UP[::FINE], DOWN[::FINE]))
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("band", "message"),
     [
-        ({"delays": -0.1}, r"delays holds -0.1 s"),
-        ({"delays": 6.0}, r"delays holds 6.0 s"),
-        ({"delays": [[1, 2, 3]]}, r"delays has shape \(1, 3\); give \(2, 2\)"),
-        ({"worst_condition": 1.0}, "worst_condition is 1.0"),
-        ({"points": 0}, "points is 0"),
-        ({"names": ("a",)}, "names holds 1; give 2 of inputs and 2 of outputs"),
-        ({"band": (1.0, 2.0)}, "holds 11 bins of 0.1 Hz, too few for 2 inputs"),
-        ({"band": (1.0, 101.0)}, "band is"),
+        ((1.0, 2.0), "holds 11 bins of 0.1 Hz, too few for 2 inputs"),
+        ((1.0, 101.0), "band is"),
     ],
 )
-def test_bad_options_are_refused(change: dict[str, object], message: str) -> None:
-    options: dict[str, object] = {"band": BAND} | change
+def test_bad_bands_are_refused(band: tuple[float, float], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
-        response_matrix(U, U, FS, **options)  # type: ignore[arg-type]
+        response_matrix(U, U, FS, band=band)
 
 
-def test_bad_records_are_refused() -> None:
-    with pytest.raises(RecordError, match=r"inputs has shape \(2000,\)"):
-        response_matrix(U[0], U, FS, band=BAND)
-    with pytest.raises(RecordError, match="inputs have 2000 samples and outputs 1999"):
-        response_matrix(U, U[:, 1:], FS, band=BAND)
-    with pytest.raises(RecordError, match="input 1 is constant at 2"):
-        response_matrix(np.stack((U[0], np.full(N, 2.0))), U, FS, band=BAND)
-    with pytest.raises(RecordError, match=r"outputs\[1\] holds nan at sample 0"):
-        response_matrix(U, np.stack((U[0], np.full(N, np.nan))), FS, band=BAND)
-
-
-@pytest.mark.parametrize("modelled", [True, *in_studies(False)])
 def test_gaps_cost_accuracy_and_the_error_says_so(
-    three_axes: tuple[np.ndarray, np.ndarray], modelled: bool
+    three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
     u, clean = three_axes
     errors, stds, whole = [], [], []
     for seed in range(4):
         rng = np.random.default_rng(seed)
         valid = np.ones(clean.shape, dtype=bool)
-        # With a model a fifth of the record; without, single samples, which a curve bridges.
-        for start in rng.integers(0, N - 60, 8 if modelled else 40):
-            valid[:, start : start + (50 if modelled else 1)] = False
+        for start in rng.integers(0, N - 60, 8):
+            valid[:, start : start + 50] = False
         y = clean + 0.01 * rng.standard_normal(clean.shape)
-        fill = clean if modelled else None
         broken = np.where(valid, y, 99.0)
         options = {"delays": DELAYS, "band": BAND}
-        found = response_matrix(u, broken, FS, valid=valid, fill=fill, **options)
+        found = response_matrix(u, broken, FS, valid=valid, fill=clean, **options)
         kept = found.usable & (found.frequency < 8.0)
         errors.append(np.abs(found.response - true_matrix(found.frequency))[kept])
         stds.append(found.std[kept])
@@ -258,11 +237,7 @@ def test_gaps_cost_accuracy_and_the_error_says_so(
     assert np.median(std) > np.median(np.concatenate(whole))
 
 
-def test_bad_masks_are_refused(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
+def test_a_lost_output_is_refused(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
     u, clean = three_axes
-    with pytest.raises(ArgumentError, match=r"valid has shape \(3,\)"):
-        response_matrix(u, clean, FS, band=BAND, valid=[True, False, True])
     with pytest.raises(RecordError, match="output 0 has 0 valid samples"):
-        response_matrix(u, clean, FS, band=BAND, valid=np.zeros(N, dtype=bool))
-    with pytest.raises(RecordError, match="fill has shape"):
-        response_matrix(u, clean, FS, band=BAND, valid=np.ones(N, dtype=bool), fill=clean[:2])
+        response_matrix(u, clean, FS, band=BAND, valid=np.zeros(N, dtype=bool), fill=clean)

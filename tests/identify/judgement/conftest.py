@@ -25,8 +25,7 @@ def evidence_of():
             fs=FS,
             highest=band[1],
             delay_correlation=None,
-            input_unit="",
-            output_unit="",
+            units=("", ""),
         )
         response = local_response(u, y, FS, delay=max(fit.delay, 0.0) / FS, band=band)
         counted = slice(None) if joint.problem.valid is None else joint.problem.valid

@@ -239,7 +239,7 @@ def test_the_silverbox_hardens(measured):
     # Resonance and damping at small amplitude.
     assert first.natural_frequency.value == pytest.approx(68.35, rel=0.005)
     assert first.damping_ratio.value == pytest.approx(0.048, rel=0.05)
-    levels = compare_levels(pairs, peaks)
+    levels = compare_levels([pair.parameters for pair in pairs], peaks)
     assert [f.code for f in levels.findings] == ["nonlinear", "hardening"]
     trend = next(t for t in levels.trends if t.name == "natural_frequency")
     assert np.all(np.diff(trend.values) > 0)

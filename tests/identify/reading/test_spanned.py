@@ -61,9 +61,7 @@ def test_an_assumption_that_the_record_excludes_widens_nothing():
 def test_values_alone_are_those_with_error_bars(structure):
     y = SENSOR.respond(SWEEP, fs=FS, intersample="bandlimited", rng=3)
     joint = joint_fit(SWEEP, y, intersample="bandlimited", structures=(structure,))
-    read = read_parameters(
-        joint, fs=FS, highest=20.0, delay_correlation=None, input_unit="", output_unit=""
-    )
+    read = read_parameters(joint, fs=FS, highest=20.0, delay_correlation=None, units=("", ""))
     values = figures_of(joint.best.fit, fs=FS, highest=20.0)
     for name, value in values.items():
         estimate = getattr(read.parameters, name)

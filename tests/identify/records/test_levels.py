@@ -105,9 +105,10 @@ def test_what_a_level_cannot_tell_is_left_out():
 
 
 def test_bad_levels_are_refused():
-    with pytest.raises(ArgumentError, match="2 levels and 1 amplitudes"):
-        compare_levels([level(1, 1), level(1, 1)], [1.0])
-    with pytest.raises(ArgumentError, match="1 level has nothing"):
-        compare_levels([level(1, 1)], [1.0])
+    record = Record.from_arrays({"u": np.arange(60.0)}, {"y": np.arange(60.0)}, fs=1.0)
+    with pytest.raises(ArgumentError, match="2 records and 1 amplitudes"):
+        identify_levels([record, record], amplitudes=[1.0])
+    with pytest.raises(ArgumentError, match="1 record has nothing"):
+        identify_levels([record])
     with pytest.raises(ArgumentError, match=r"amplitude -2\.0 is not a positive"):
         compare_levels([level(1, 1), level(1, 1)], [1.0, -2.0])

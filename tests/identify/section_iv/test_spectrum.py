@@ -99,9 +99,9 @@ def test_equation_18_scales_with_the_output(scale: float, seed: int) -> None:
 def test_equation_18_is_the_ratio_of_the_two_spectra(seed: int) -> None:
     rng = np.random.default_rng(seed)
     u, y = rng.standard_normal(50), rng.standard_normal(50)
-    g = transfer_function(u, y, 10.0, window="hann", pad=14)
-    above = spectrum(y, 10.0, window="hann", pad=14).value
-    below = spectrum(u, 10.0, window="hann", pad=14).value
+    g = transfer_function(u, y, 10.0, pad=14)
+    above = spectrum(y, 10.0, pad=14).value
+    below = spectrum(u, 10.0, pad=14).value
     np.testing.assert_allclose(g.response * below, above, atol=1e-9)
 
 

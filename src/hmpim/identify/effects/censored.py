@@ -110,27 +110,8 @@ def fit_censored(
     `valid` of the problem excludes invalid samples, but no clipped ones. `fit` has the structure
     and the starting values; a fit to the samples that are not clipped is enough. `saturation` is
     None for an output that was only held, `arrivals` for one that is updated at every sample.
-    `drift`, (n,), was removed from the output, and moves the levels.
-
-    Raises
-    ------
-    RecordError
-        If too few samples are inside the range for the parameters.
-
-    Examples
-    --------
-    >>> from hmpim.identify.effects.saturation import detect_saturation
-    >>> from hmpim.model import STRUCTURES, prepare_input
-    >>> u = np.sin(np.arange(2000) / 20)
-    >>> noisy = 3.0 * u + 0.1 * np.random.default_rng(0).standard_normal(2000)
-    >>> clipped = np.clip(noisy, -2.0, 2.0)
-    >>> data = Problem(
-    ...     source=prepare_input(u, "bandlimited"), y=clipped, valid=None, longest_delay=5.0
-    ... )
-    >>> plain = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> better = fit_censored(data, plain, detect_saturation(clipped))
-    >>> [round(float(fit.linear[0]), 1) for fit in (plain, better.fit)], round(better.noise_std, 1)
-    ([2.3, 3.0], 0.1)
+    `drift`, (n,), was removed from the output, and moves the levels. Too few samples inside the
+    range are a `RecordError`.
     """
     data = _data(problem, saturation, arrivals, drift)
     state = _start(data, fit)
@@ -156,7 +137,7 @@ def _data(
     problem: Problem,
     saturation: Saturation | None,
     arrivals: Updates | None,
-    drift: Real | None = None,
+    drift: Real | None,
 ) -> _Data:
     n = problem.y.size
     counted = np.ones(n, dtype=bool) if problem.valid is None else problem.valid
@@ -166,8 +147,7 @@ def _data(
     else:
         keep = counted[arrivals.index]
         arrivals = replace(arrivals, index=arrivals.index[keep], age=arrivals.age[keep])
-    nothing = np.zeros(arrivals.index.size, dtype=bool)
-    low = high = nothing
+    low = high = np.zeros(arrivals.index.size, dtype=bool)
     moved = np.zeros(arrivals.index.size) if drift is None else drift[arrivals.index]
     low_edge, high_edge, after = moved - np.inf, moved + np.inf, False
     if saturation is not None:

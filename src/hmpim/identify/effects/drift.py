@@ -6,7 +6,7 @@ Legendre polynomials, or the exponential and its derivative with respect to T, a
 fit, solved with bias and numerator; the error bars come from the derivatives of all.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -149,13 +149,13 @@ def _unless_steady(
     return without_rows(joint, slice(len(columns))), drifting
 
 
-def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> tuple[Finding, ...]:
+def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> Iterator[Finding]:
     """Report how the bias drifts, and doubt the noise if the residual is not `white`."""
     rate, std = drifting.rate * fs, drifting.rate_std * fs
     per = f" {unit}/s" if unit else " per s"
     span = f"{float(np.ptp(drifting.trend)):.3g} {unit}".rstrip()
     shape = "steadily" if drifting.steady else "unsteadily"
-    drifts = Finding(
+    yield Finding(
         code="drift",
         message=f"The bias drifts {shape}, by {span} over the record, on average by "
         f"{rate:.3g} ± {std:.2g}{per}; the drift is removed, and the bias stated is the mean "
@@ -163,16 +163,14 @@ def drift_findings(drifting: Drifting, fs: float, unit: str, *, white: bool) -> 
         severity="info",
         parameters=("bias",),
     )
-    if white:
-        return (drifts,)
-    unsure = Finding(
-        code="drift_or_noise",
-        message="The residual is not white once the drift is removed: slow parts of it may be "
-        "drift rather than noise. Let the unit warm up, and repeat the test.",
-        severity="doubt",
-        parameters=("noise_std",),
-    )
-    return drifts, unsure
+    if not white:
+        yield Finding(
+            code="drift_or_noise",
+            message="The residual is not white once the drift is removed: slow parts of it may be "
+            "drift rather than noise. Let the unit warm up, and repeat the test.",
+            severity="doubt",
+            parameters=("noise_std",),
+        )
 
 
 def _may_drift(joint: JointFit) -> bool:
@@ -187,9 +185,8 @@ def _may_drift(joint: JointFit) -> bool:
 
 def is_slow(problem: Problem, fit: Fit) -> bool:
     """Whether the residual varies slowly."""
-    counted = np.arange(problem.y.size) if problem.valid is None else np.flatnonzero(problem.valid)
-    residual = fit.residual[counted]
-    if counted.size < _FEWEST:
+    residual = problem.counting(fit.residual)
+    if residual.size < _FEWEST:
         return False
     # In 1/f noise, polynomial k has the power of bin k / 2.
     flicker = np.mean(2.0 / np.arange(1, 5)) / np.mean(1.0 / np.arange(8, 41))  # 20.4

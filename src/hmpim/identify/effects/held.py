@@ -48,20 +48,6 @@ def rows_at_updates(problem: Problem, fit: Fit, arrivals: Updates) -> Real:
     """Derivatives of the output at each update with respect to `theta`, then `linear`, (p, m).
 
     The rows from `theta.size` on, times `linear`, are the output itself. `valid` is ignored.
-
-    Examples
-    --------
-    A ramp through a gain of 2, read 0 and 0.25 samples before it shows:
-
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model import STRUCTURES, prepare_input
-    >>> u = np.arange(8.0)
-    >>> ramp = Problem(source=prepare_input(u, "foh"), y=2 * u, valid=None, longest_delay=2.0)
-    >>> fit = fit_structure(ramp, STRUCTURES["static"], np.zeros(1))
-    >>> arrivals = Updates(index=np.array([3, 6]), age=np.array([0.0, 0.25]))
-    >>> rows = rows_at_updates(ramp, fit, arrivals)
-    >>> (fit.linear @ rows[1:]).round(9).tolist()
-    [6.0, 11.5]
     """
     whole = replace(problem, valid=None)
     nodes, share = _weights(arrivals.age, smooth=problem.source.degree > 1)

@@ -85,19 +85,6 @@ def is_predicted(found: Quantization, y: Real, prediction: Real) -> bool:
 
     They do if an input of few levels drives a unit without dynamics. The characteristic function
     of a sum is the product of those of its parts. Values exactly on the grid are always rounded.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> clean = 0.13 * rng.integers(0, 8, 2000)
-    >>> noisy = clean + 0.002 * rng.standard_normal(2000)
-    >>> found = detect_quantization(noisy)
-    >>> round(found.step, 2), is_predicted(found, noisy, clean)
-    (0.13, True)
-    >>> smooth = np.sin(np.arange(2000) / 50)
-    >>> rounded = 0.1 * np.rint(smooth / 0.1) + 0.002 * rng.standard_normal(2000)
-    >>> is_predicted(detect_quantization(rounded), rounded, smooth)
-    False
     """
     if found.exact:
         return False

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, FALSE_ALARM, ONE_SIDED
-from hmpim.identify.effects.smeared import Side, smeared_plateaus
+from hmpim.identify.effects.smeared import Side, corrections, smeared_plateaus
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TWICE
 
 __all__ = ["Saturation", "detect_saturation", "goes_beyond"]
@@ -95,10 +95,9 @@ def _upper(y: Real, prediction: Real | None, step: float, scatter: float) -> Sid
     span = float(np.ptp(y))
     if span == 0.0:
         return None
-    exact = _exact(y, span, step)
-    if exact is not None and _is_clipped(y, exact, prediction, step, span, scatter):
-        return exact
-    return None
+    side = _exact(y, span, step)
+    clipped = side is not None and _is_clipped(y, side, prediction, step, span, scatter)
+    return side if clipped else None
 
 
 def _spread(x: Real) -> float:
@@ -218,9 +217,7 @@ def _beyond(
 
     Its gain, bias and timing are corrected on the samples that are not at the level.
     """
-    slope = np.gradient(prediction)
-    rows = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
-    free = ~at
+    rows, free = corrections(prediction), ~at
     between = free & (y > y.min() + resolution)  # the other end may be clipped too
     if np.count_nonzero(between) > FEW * y.size:
         free = between

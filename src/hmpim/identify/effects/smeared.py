@@ -15,7 +15,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import FEW, MUCH, WORTH
 
-__all__ = ["Side", "smeared_plateaus"]
+__all__ = ["Side", "corrections", "smeared_plateaus"]
 
 _FEWEST = 12
 """Fewest samples at a level."""
@@ -60,19 +60,8 @@ def smeared_plateaus(
     The prediction is that of a linear model; samples where it is beyond a level are at that level.
     `step` is that to which the output is rounded, in its unit; 0 for none. The values are the low
     and the high side, None where it is not clipped.
-
-    Examples
-    --------
-    >>> p = np.sin(np.arange(2000) / 50)
-    >>> noise = 0.1 * np.random.default_rng(0).standard_normal(2000)
-    >>> low, high = smeared_plateaus(np.minimum(p, 0.7) + noise, p)
-    >>> round(high.level, 1), low
-    (0.7, None)
-    >>> smeared_plateaus(p + noise, p)
-    (None, None)
     """
-    slope = np.gradient(prediction)
-    everything = np.stack([np.ones(y.size), prediction, slope, np.gradient(slope)])
+    everything = corrections(prediction)
     every = 1 + y.size // _MOST  # some samples of a long record are enough
     rows, prediction, y = everything[:, ::every], prediction[::every], y[::every]
     sides = _falls_short(y, rows)
@@ -108,6 +97,12 @@ def smeared_plateaus(
         side(best.low, best.below, unclipped < best.low) if kept[0] else None,
         side(best.high, best.above, unclipped > best.high) if kept[1] else None,
     )
+
+
+def corrections(prediction: Real) -> Real:
+    """Rows, (4, n), that correct the bias, gain and timing of a prediction."""
+    slope = np.gradient(prediction)
+    return np.stack([np.ones(prediction.size), prediction, slope, np.gradient(slope)])
 
 
 def _cost(y: Real, rows: Real) -> float:

@@ -28,13 +28,13 @@ from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
 from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
 from hmpim.identify.fleets.pole import with_tails
-from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
 from hmpim.identify.noise.whiteness import are_white
 from hmpim.identify.reading.figures import units_of
 from hmpim.identify.result import Estimate, Parameters, fit_percent
 from hmpim.identify.result.error_bars import noise_estimate
+from hmpim.identify.result.groups import SIZES
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Intersample
 

@@ -27,6 +27,7 @@ from hmpim.identify.judgement.residual import folded_power
 from hmpim.identify.nonlinear.evidence import are_curved
 from hmpim.identify.nonlinear.harmonics import any_harmonics
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
+from hmpim.identify.result.groups import SIZES
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import BLURRED, FEW, MUCH, WORTH
@@ -43,10 +44,6 @@ _FORGOTTEN = 40.0
 
 _DETERMINED = 1e-12
 """Share of the greatest direction, below which the record does not determine a direction."""
-
-_TOLD = ("scale_factor", "natural_frequency", "damping_ratio", "bandwidth_phase90",
-         "bandwidth_phase90_without_delay", "bandwidth_3db")  # fmt: skip
-"""Figures whose relative deviation is checked."""
 
 
 def are_quiet(
@@ -87,8 +84,8 @@ def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
     fit, fs, n = group.fit, fleet.fs, fleet.u.size
     cost = fit.cost[group.some]
     known = n * np.log(simpler / cost[:, None]).min(axis=1) > 2 * EXCLUDED
-    for name in _TOLD:
-        if name in group.alone:
+    for name in SIZES:
+        if name in group.alone and name != "time_constant":  # as in `weak_excitation`
             column = group.alone[name]
             known &= np.isnan(column.value) | (column.std <= MUCH * np.abs(column.value))
     delay = group.alone["delay"]

@@ -47,7 +47,7 @@ from hmpim.identify.result import (
     Parameters,
     fit_percent,
 )
-from hmpim.identify.result.groups import EVERY
+from hmpim.identify.result.groups import BANDWIDTHS, EVERY
 from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
 from hmpim.model import RationalDelay
@@ -67,8 +67,6 @@ _APART = 0.05
 _ASKED = 0.5 * (np.sqrt(2.0 * CLEARLY) - 0.5) ** 2
 """Log-likelihood half a deviation below CLEARLY, from which a record is tested for a nonlinearity:
 the residual that it causes in the unit in the middle is not quite that in each unit."""
-
-_BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 _NOTHING = Nonlinearity(share=0.0, even=0.0, odd=0.0, noise=1.0, linear=0.0, nonlinear=0.0)
 
@@ -147,10 +145,10 @@ def whole_pairs(
     power = np.vecdot(centred, centred)
     simpler = np.stack([costs_of(each, centred, power) for each in whole.simpler], axis=1)
     found: list[PairIdentification | None] = [None] * outputs.shape[0]
-    bandwidths = [name for name in _BANDWIDTHS if name in fleet.names]
+    bandwidths = [name for name in BANDWIDTHS if name in fleet.names]
     columns = {name: column.copy() for name, column in fit.columns.items()}
     for group in fit.groups:
-        some = group.some
+        some, mode = group.some, group.fit.member.intersample
         costs = simpler[some]
         quiet = are_quiet(fleet, group, outputs[some], simpler=costs, sweep=whole.sweep)
         places = np.flatnonzero(quiet)
@@ -170,16 +168,14 @@ def whole_pairs(
             vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
             system = system_of(fleet.structure, vector, fleet.fs)
             own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
-            crossings = response_bandwidths(
-                response, system, own, fs=fleet.fs, intersample=group.fit.member.intersample
-            )
+            crossings = response_bandwidths(response, system, own, fs=fleet.fs, intersample=mode)
             if disagreeing(crossings, own):
                 continue
             pair = PairIdentification(
                 input=names[0],
                 output=names[1],
                 structure=fleet.structure.name,
-                intersample=group.fit.member.intersample,
+                intersample=mode,
                 fit_percent=float(fit.fit_percent[i]),
                 parameters=replace(
                     parameters_of(columns, i), delay_correlation=from_lag(paper.delay, fleet.fs)
@@ -292,7 +288,7 @@ def _findings(fleet: Fleet, group: Group, k: int, own: Parameters) -> tuple[Find
     """Findings on a quiet record: figures beyond its band, and models that its intervals cover."""
     i = int(group.some[k])
     found: list[Finding] = []
-    missing = [name for name in _BANDWIDTHS if getattr(own, name) is None]
+    missing = [name for name in BANDWIDTHS if getattr(own, name) is None]
     if missing:
         found.append(unreached_bandwidths(missing, band_end=fleet.band[1]))
     delay = group.tails.get(k)

@@ -13,13 +13,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.frf.choice import choose, picked
 from hmpim.identify.frf.columns import Columns
-from hmpim.identify.frf.neighbours import LocalFit, centres_in_band, mirrored, windows_around
+from hmpim.identify.frf.neighbours import (
+    Integer,
+    LocalFit,
+    centres_in_band,
+    mirrored,
+    windows_around,
+)
 from hmpim.identify.frf.rational import (
     NUMERATOR,
     TRANSIENT_ORDER,
@@ -31,8 +37,8 @@ from hmpim.identify.frf.rational import (
     read_off,
     solved,
 )
-from hmpim.identify.signals import as_signal, bins_in, check_band, check_rate
-from hmpim.identify.worth import PART
+from hmpim.identify.signals import bins_in, check_band
+from hmpim.identify.worth import MATERIAL, PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
@@ -47,45 +53,24 @@ _AFFORDABLE = 60_000
 # Fewest valid samples of an output.
 _FEWEST = 16
 
-Integer = NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResponseMatrix:
-    """Frequency responses from every input to every output, measured at once.
+    """Frequency responses from m inputs to p outputs, measured at once."""
 
-    Parameters
-    ----------
-    frequency : ndarray, shape (f,)
-        Hz.
-    response : complex ndarray, shape (f, p, m)
-        Output i over input j, delay included; NaN where not `usable`.
-    std : ndarray, shape (f, p, m)
-        √E|error|²; NaN where not `usable`.
-    condition : ndarray, shape (f,)
-        Condition number of the inputs' spectra over a quarter of the band around, or, if that is
-        larger, of the error of the responses there: 1 for inputs that have nothing in common,
-        infinite for identical ones. Inputs are scaled to their own power.
-    usable : bool ndarray, shape (f,)
-        Whether the inputs can be separated.
-    multiple_coherence : ndarray, shape (f, p)
-        Share of the output's power in the window that all inputs together explain, less the share
-        of noise that as many coefficients explain.
-    partial_coherence : ndarray, shape (f, p, m)
-        Share that one input explains of the residual of the others, likewise.
-    inputs, outputs : tuple of str
-        Names.
-    """
-
-    frequency: Real
-    response: Complex
-    std: Real
+    frequency: Real  # (f,): Hz
+    response: Complex  # (f, p, m): output over input, delay included; NaN where not `usable`
+    std: Real  # (f, p, m): √E|error|²; NaN where not `usable`
+    # (f,): condition number of the inputs' spectra over a quarter of the band around, or, if that
+    # is larger, of the error of the responses there: 1 for inputs that have nothing in common,
+    # infinite for identical ones. Inputs are scaled to their own power.
     condition: Real
-    usable: Mask
+    usable: Mask  # (f,): whether the inputs can be separated
+    # (f, p): share of the output's power in the window that all inputs together explain, less the
+    # share of noise that as many coefficients explain
     multiple_coherence: Real
+    # (f, p, m): share that one input explains of the residual of the others, likewise
     partial_coherence: Real
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -98,52 +83,31 @@ class _Joint:
 
 
 def response_matrix(
-    inputs: ArrayLike,
-    outputs: ArrayLike,
+    inputs: Real,
+    outputs: Real,
     fs: float,
     *,
     delays: ArrayLike = 0.0,
     band: tuple[float, float],
-    valid: ArrayLike | None = None,
-    fill: ArrayLike | None = None,
-    worst_condition: float = 10.0,
+    valid: Mask | None = None,
+    fill: Real | None = None,
     points: int = 400,
     names: Sequence[str] | None = None,
 ) -> ResponseMatrix:
     """Return the responses of all outputs to all inputs of one simultaneous test.
 
-    Parameters
-    ----------
-    inputs : array_like, shape (m, n)
-        Stimuli on one clock, at rest before the record.
-    outputs : array_like, shape (p, n)
-        Responses.
-    fs : float
-        Sampling rate, Hz.
-    delays : array_like, shape (p, m), (p, 1) or ()
-        Pure delays in s, output over input, not negative; rough values suffice.
-    band : tuple of float
-        Band that every input excites, Hz.
-    valid : array_like of bool, shape (p, n) or (n,), optional
-        False where an output is missing; all samples are valid by default.
-    fill : array_like, shape (p, n), optional
-        A model's prediction of the outputs, bias included, used where they are missing. By default
-        a smooth curve through the neighbours, for gaps that are short compared with a period.
-    worst_condition : float
-        Greatest condition number at which inputs count as separated, above 1. At 10 the error of
-        the worst combination of inputs is ten times that of the best.
-    points : int
-        Greatest number of frequencies; beyond it they are spaced by a constant ratio.
-    names : sequence of str, optional
-        Of the inputs, then of the outputs; "input 0" and so on by default.
+    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The
+    outputs, (p, n), follow them by delays in s, (p, 1) or (), not negative; rough values suffice.
+    Where an output is not `valid`, (n,) or (p, n), it is taken from `fill`, (p, n), a model's
+    prediction with the bias. At most `points` frequencies are spaced by a constant ratio. `names`
+    are those of the inputs, then of the outputs, for messages.
 
     Raises
     ------
     RecordError
-        For shapes that do not fit, NaN, a constant input, or inputs that are multiples or sums of
-        others over the whole band: they are named.
+        For inputs that are multiples or sums of others over the whole band: they are named.
     ArgumentError
-        For an impossible rate, band, delay, bound or names.
+        For an impossible band, or one with too few bins.
 
     Examples
     --------
@@ -157,47 +121,31 @@ def response_matrix(
     >>> bool(found.usable.all())
     True
     """
-    u, y = _checked_signals("inputs", inputs), _checked_signals("outputs", outputs)
-    m, p = u.shape[0], y.shape[0]
-    if u.shape[1] != y.shape[1]:
-        raise RecordError(
-            f"inputs have {u.shape[1]} samples and outputs {y.shape[1]}; cut them to the same span"
-        )
-    check_rate(fs)
+    (m, samples), p = inputs.shape, outputs.shape[0]
     check_band(band, fs)
     numbered = [*(f"input {k}" for k in range(m)), *(f"output {k}" for k in range(p))]
     labels = tuple(numbered if names is None else names)
-    if len(labels) != m + p:
-        raise ArgumentError(f"names holds {len(labels)}; give {m} of inputs and {p} of outputs")
-    labels_u, labels_y = labels[:m], labels[m:]
-    late = _checked_delays(delays, p, m, u.shape[1] / fs)
-    if not worst_condition > 1:
-        raise ArgumentError(f"worst_condition is {worst_condition}; give a number above 1")
-    if points < 1:
-        raise ArgumentError(f"points is {points}; give at least 1")
-    y, share = _filled(y, valid, fill, labels_y)
-    for row, label in zip(u, labels_u, strict=True):
-        if np.ptp(row) == 0:
-            raise RecordError(f"{label} is constant at {row[0]:g}; an input must move")
+    late = np.broadcast_to(np.asarray(delays, dtype=np.float64), (p, 1))
+    y, share = _filled(outputs, valid, fill, labels[m:])
     base = int(np.floor(late.min() * fs + 1e-9))
-    step = fs / (u.shape[1] - base)
-    bins = (u.shape[1] - base - 1) // 2 + 1
+    step = fs / (samples - base)
+    bins = (samples - base - 1) // 2 + 1
     low, high = bins_in(band, step, bins)
     if high - low < 8 * (m + 1):
         raise ArgumentError(
             f"band is ({band[0]:g}, {band[1]:g}) Hz and holds {max(high - low + 1, 0)} bins of "
             f"{step:g} Hz, too few for {m} inputs; give a wider band or a longer record"
         )
-    _refuse_identical(u, low, high, labels_u)
+    _refuse_identical(inputs, low, high, labels[:m])
     centre = centres_in_band(low, high, points)
-    each = [_chosen(_moved(u, row, fs, base), y[i], base, centre) for i, row in enumerate(late)]
+    moved = [_moved(inputs, own, fs, base) for own in late[:, 0].tolist()]
+    each = [_chosen(u, own, base, centre) for u, own in zip(moved, y, strict=True)]
     response, variance, conditions, coherence = (
         np.stack(parts, axis=1) for parts in zip(*each, strict=True)
     )
     frequency = centre * step
-    inputs_alone = _input_condition(_moved(u, late[0], fs, base), centre)
-    condition = np.maximum(inputs_alone, conditions.max(axis=1))
-    usable = condition <= worst_condition
+    condition = np.maximum(_input_condition(moved[0], centre), conditions.max(axis=1))
+    usable = condition <= MATERIAL**-0.5
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
     # Filled samples have no residual and add no information: both raise the error.
     std = np.sqrt(variance) / share[:, None]
@@ -211,64 +159,22 @@ def response_matrix(
         usable=usable,
         multiple_coherence=coherence[:, :, -1],
         partial_coherence=coherence[:, :, :-1],
-        inputs=labels_u,
-        outputs=labels_y,
     )
 
 
 def _filled(
-    y: Real, valid: ArrayLike | None, fill: ArrayLike | None, labels: tuple[str, ...]
+    y: Real, valid: Mask | None, fill: Real | None, labels: tuple[str, ...]
 ) -> tuple[Real, Real]:
     """Outputs with their gaps filled, (p, n), and the share of each that was measured, (p,)."""
-    if valid is None:
+    if valid is None or fill is None:
         return y, np.ones(y.shape[0])
-    mask = np.asarray(valid)
-    if mask.dtype != np.bool_ or mask.shape not in (y.shape, y.shape[1:]):
-        raise ArgumentError(
-            f"valid has shape {mask.shape} and type {mask.dtype}; give booleans of shape {y.shape} "
-            f"or ({y.shape[1]},)"
-        )
-    mask = np.broadcast_to(mask, y.shape)
-    given = None if fill is None else np.asarray(fill, dtype=np.float64)
-    if given is not None and given.shape != y.shape:
-        raise RecordError(f"fill has shape {given.shape} and outputs {y.shape}; give as many")
-    out = y.copy()
-    for i, (row, counts, label) in enumerate(zip(out, mask, labels, strict=True)):
-        measured, gaps = np.flatnonzero(counts), np.flatnonzero(~counts)
-        if measured.size < _FEWEST:
+    mask = np.broadcast_to(valid, y.shape)
+    for counts, label in zip(mask, labels, strict=True):
+        if (measured := int(np.count_nonzero(counts))) < _FEWEST:
             raise RecordError(
-                f"{label} has {measured.size} valid samples; at least {_FEWEST} are needed"
+                f"{label} has {measured} valid samples; at least {_FEWEST} are needed"
             )
-        if given is not None:
-            row[gaps] = given[i, gaps]
-        elif gaps.size:
-            row[gaps] = scipy.interpolate.PchipInterpolator(measured, row[measured])(gaps)
-    return out, np.asarray(mask.mean(axis=1))
-
-
-def _checked_signals(name: str, values: ArrayLike) -> Real:
-    array = np.asarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[0] < 1:
-        raise RecordError(f"{name} has shape {array.shape}; give one row for each channel, (m, n)")
-    for k, row in enumerate(array):
-        as_signal(f"{name}[{k}]", row)
-    return array
-
-
-def _checked_delays(delays: ArrayLike, p: int, m: int, length: float) -> Real:
-    late = np.asarray(delays, dtype=np.float64)
-    try:
-        late = np.broadcast_to(late, (p, m))
-    except ValueError:
-        raise ArgumentError(
-            f"delays has shape {late.shape}; give ({p}, {m}), output over input"
-        ) from None
-    wrong = late[~((late >= 0) & (late < length / 2))]
-    if wrong.size:
-        raise ArgumentError(
-            f"delays holds {wrong[0]} s; give 0 or more, and less than half the record"
-        )
-    return np.asarray(late)
+    return np.where(mask, y, fill), np.asarray(mask.mean(axis=1))
 
 
 def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
@@ -305,18 +211,13 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
     return np.asarray(ratio)[windows.near]
 
 
-def _moved(u: Real, late: Real, fs: float, base: int) -> Complex:
-    """Transforms of the inputs, each delayed as its response is, less `base` samples."""
-    length = u.shape[1] - base
-    moved = np.empty((u.shape[0], length))
-    rest = np.empty(late.size)
-    for j, row in enumerate(u):
-        lag = int(np.floor(late[j] * fs + 1e-9)) - base
-        moved[j, lag:] = row[: length - lag]
-        moved[j, :lag] = row[0]  # an input is at rest before the record
-        rest[j] = late[j] * fs - (lag + base)
+def _moved(u: Real, late: float, fs: float, base: int) -> Complex:
+    """Transforms of the inputs, delayed as the responses to them are, less `base` samples."""
+    length, lag = u.shape[1] - base, int(np.floor(late * fs + 1e-9)) - base
+    # An input is at rest before the record.
+    moved = np.concatenate([np.repeat(u[:, :1], lag, axis=1), u[:, : length - lag]], axis=1)
     count = (length - 1) // 2 + 1
-    turn = np.exp(-2j * np.pi * np.outer(rest, np.arange(count)) / length)
+    turn = np.exp(-2j * np.pi * ((late * fs - (lag + base)) * np.arange(count)) / length)
     spectra: Complex = np.asarray(scipy.fft.rfft(moved, axis=1))[:, :count] * turn
     spectra[:, 0] = 0.0
     return spectra

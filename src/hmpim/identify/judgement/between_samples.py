@@ -4,22 +4,11 @@ from collections.abc import Iterable, Iterator
 
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
-from hmpim.identify.result.groups import PHASE_SPLIT, in_words
+from hmpim.identify.result.groups import PHASE_SPLIT, SIZES, in_words
 from hmpim.identify.worth import FEW, PART
 from hmpim.record import Finding, Intersample
 
-__all__ = ["SIZES", "other_intersample", "undetermined_between", "wide_span"]
-
-SIZES = (
-    "scale_factor",
-    "natural_frequency",
-    "damping_ratio",
-    "time_constant",
-    "bandwidth_phase90",
-    "bandwidth_phase90_without_delay",
-    "bandwidth_3db",
-)
-"""Figures whose error is stated as a share of their value."""
+__all__ = ["other_intersample", "undetermined_between", "wide_span"]
 
 _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 """Figures that move with the delay, or with the structure."""

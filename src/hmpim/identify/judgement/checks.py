@@ -15,9 +15,10 @@ from hmpim.identify.judgement.structure import missed_pole, other_order
 from hmpim.identify.judgement.verdict import UNKNOWN, doubted
 from hmpim.record import Finding
 
-__all__ = ["CHECKS", "Check", "attempt", "judge"]
+__all__ = ["CHECKS", "COMPRESSED", "Check", "attempt", "judge"]
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 Check = Callable[[Evidence], Iterable[Finding]]
 """A function from the evidence to findings."""
@@ -68,6 +69,13 @@ SAMPLED: tuple[Check, ...] = (
 )
 """The checks for software, which has neither poles beyond the band nor a clock."""
 
+COMPRESSED: tuple[Check, ...] = (
+    *(reach.initial_transient, residual.lack_of_fit, not_converged, weak_excitation, weak_delay),
+    *(reach.fast_mode, reach.natural_frequency_beyond, reach.integrator, reach.beyond_band),
+    *(other_order, missed_pole, other_intersample, wide_span, reach.negative_delay),
+)
+"""The checks for statistics, which need no samples."""
+
 _OF_THE_RESIDUAL: tuple[Check, ...] = (
     *(residual.lack_of_fit, residual.coloured_noise, residual.changing_noise),
     *(residual.halves_disagree, residual.noise_colour_of, residual.uneven_noise),
@@ -86,9 +94,8 @@ def judge(evidence: Evidence, *, checks: Sequence[Check] | None = None) -> tuple
     if evidence.is_without_noise:
         checks = [check for check in checks if check not in _OF_THE_RESIDUAL]
     found: list[Finding] = []
-    nothing: tuple[Finding, ...] = ()
     for check in checks:
-        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), nothing)
+        made, failure = attempt(check.__name__, partial(_findings_of, check, evidence), ())
         found += [*made, *failure]
     # Figures that are not given need no further remark.
     unknown = doubted(finding for finding in found if finding.code in UNKNOWN)
@@ -106,7 +113,7 @@ def _findings_of(check: Check, evidence: Evidence) -> tuple[Finding, ...]:
     return tuple(check(evidence))
 
 
-def attempt(name: str, look: Callable[[], T], otherwise: T) -> tuple[T, tuple[Finding, ...]]:
+def attempt(name: str, look: Callable[[], T], otherwise: U) -> tuple[T | U, tuple[Finding, ...]]:
     """Return what `look` returns; if it raises, return `otherwise` and a finding.
 
     Examples

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator
 
-from hmpim.identify.judgement.between_samples import SIZES
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.result import Estimate
-from hmpim.identify.result.groups import MODELLED, in_words
+from hmpim.identify.result.groups import MODELLED, SIZES, in_words
 from hmpim.identify.worth import BLURRED, MOST, MUCH
 from hmpim.record import Finding
 

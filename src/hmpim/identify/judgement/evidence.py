@@ -92,9 +92,8 @@ class Evidence:
         Each is given with its relative move, 0 if one of the others lacks it.
         """
         moved = {}
-        for name in MODELLED:
-            own = getattr(self.readings.parameters, name)
-            if own is None or name == "noise_std":
+        for name, own in self.readings.parameters.given.items():
+            if name not in MODELLED or name == "noise_std":
                 continue
             values = [other.get(name) for other in others]
             far = max((abs(v - own.value) for v in values if v is not None), default=0.0)

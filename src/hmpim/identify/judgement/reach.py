@@ -15,7 +15,7 @@ from hmpim.identify.fitting.growth import scale_of
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import windowed_power
-from hmpim.identify.result.groups import MODELLED, PHASE_SPLIT, TIMING, in_words
+from hmpim.identify.result.groups import BANDWIDTHS, MODELLED, PHASE_SPLIT, TIMING, in_words
 from hmpim.identify.worth import DEEPEST, FEW, PART, PAST, ROUNDING, TWICE
 from hmpim.model import response
 from hmpim.record import Finding
@@ -53,8 +53,6 @@ _COMPUTED = (
 
 _OF_SLOWEST = ("time_constant", "natural_frequency", "damping_ratio")
 """Figures of the slowest poles."""
-
-_BANDWIDTHS = ("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db")
 
 
 def initial_transient(evidence: Evidence) -> Iterator[Finding]:
@@ -170,7 +168,7 @@ def integrator(evidence: Evidence) -> Iterator[Finding]:
         message=f"{why}: there is no gain at DC to measure bandwidths from, and the scale factor "
         f"is the {scale}.",
         severity="info",
-        parameters=("scale_factor", *_BANDWIDTHS),
+        parameters=("scale_factor", *BANDWIDTHS),
     )
 
 

@@ -88,13 +88,13 @@ def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
     late = FEW / evidence.fs
     rooms = {"noise_std": -np.inf, "bias": MATERIAL * float(motion)}
     rooms |= {"delay": late, "delay_low_frequency": late}
-    known = {name: getattr(evidence.readings.parameters, name) for name in MODELLED}
-    if (peak := known["peak_gain_db"]) is not None:
-        rooms["peak_gain_db"] = MATERIAL * max(abs(peak.value), 1.0)
+    known = evidence.readings.parameters.given
+    if "peak_gain_db" in known:
+        rooms["peak_gain_db"] = MATERIAL * max(abs(known["peak_gain_db"].value), 1.0)
     return tuple(
         name
         for name, e in known.items()
-        if e is not None and times * e.spread > rooms.get(name, MATERIAL * abs(e.value))
+        if name in MODELLED and times * e.spread > rooms.get(name, MATERIAL * abs(e.value))
     )
 
 

@@ -1,7 +1,7 @@
 """From findings to a verdict for each parameter, and one for the pair."""
 
 from collections.abc import Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from hmpim.identify.result import (
@@ -63,12 +63,12 @@ def judged(pair: PairIdentification) -> PairIdentification:
     )
     intervals = {
         name: replace(e, std=None if name in unknown else e.spread, ci95=None)
-        for name in withheld
-        if (e := getattr(pair.parameters, name)) is not None
+        for name, e in pair.parameters.given.items()
+        if name in withheld
     }
     parameters = _all_weighed(replace(pair.parameters, **intervals), doubted(pair.warnings))
-    given = (getattr(parameters, name) for name in EVERY)
-    verdict: Verdict = "ok" if all(e is None or e.verdict == "ok" for e in given) else "doubtful"
+    sound = all(e.verdict == "ok" for e in parameters.given.values())
+    verdict: Verdict = "ok" if sound else "doubtful"
     if any(finding.code in _NOTHING for finding in pair.warnings):
         verdict = "not_identifiable"
     response = _all_weighed(pair.from_response, shared)
@@ -118,10 +118,8 @@ def doubted(findings: Iterable[Finding]) -> frozenset[str]:
 
 def _all_weighed(holder: H, names: frozenset[str]) -> H:
     """Give every estimate its verdict."""
-    given = {f.name: e for f in fields(holder) if (e := getattr(holder, f.name)) is not None}
-    return replace(
-        holder, **{name: _weighed(e, doubtful=name in names) for name, e in given.items()}
-    )
+    given = holder.given.items()
+    return replace(holder, **{name: _weighed(e, doubtful=name in names) for name, e in given})
 
 
 def _weighed(estimate: Estimate, *, doubtful: bool) -> Estimate:

@@ -33,17 +33,6 @@ def input_noise(u: Real, fs: float, *, band: tuple[float, float]) -> InputNoise 
 
     None if no noise is detected: there is no flat floor above rounding, or the input (steps, PRBS,
     noise) excites all frequencies, so that its noise is not identifiable.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> t = np.arange(4000) / 400
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noisy = u + 0.02 * np.random.default_rng(0).standard_normal(t.size)
-    >>> round(input_noise(noisy, 400.0, band=(0.1, 20.0)).std, 3)
-    0.02
-    >>> input_noise(u, 400.0, band=(0.1, 20.0)) is None
-    True
     """
     if np.mean(np.diff(u) == 0.0) > PART:  # noise repeats no value
         return None

@@ -28,15 +28,6 @@ def level_of(innovations: Real) -> Real | None:
     (R. J. Carroll, Annals of Statistics 10, 1982). No level is less than a fifth of the overall
     r.m.s. Samples of 0 do not count. None if the level does not change, or there are too few
     samples.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).standard_normal(4000)
-    >>> level_of(noise) is None
-    True
-    >>> level = level_of(np.where(np.arange(4000) < 1000, 4.0, 1.0) * noise)
-    >>> round(float(level[500] / level[2500]))
-    4
     """
     window = max(innovations.size // _PARTS, _FEWEST)
     if innovations.size < _WINDOWS * window or is_steady(innovations):

@@ -69,13 +69,7 @@ class Instrument:
 
 
 def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Instrument]:
-    """Put all channels on one clock, and replace the input by the part that the reference moves.
-
-    Raises
-    ------
-    ArgumentError
-        If the record has several inputs or is software's, or no channel has that name.
-    """
+    """Put all channels on one clock, and replace the input by the part that the reference moves."""
     if len(record.inputs) > 1:
         raise ArgumentError(
             f"reference={reference!r} requires a record of one input; this one has "
@@ -100,13 +94,7 @@ def aligned_with_reference(record: Record, reference: str) -> tuple[Aligned, Ins
 
 
 def instrument_of(name: str, reference: Real, u: Real) -> Instrument:
-    """Fit the part of an input that a reference moves, (n,): weights over its past, by Akaike.
-
-    Raises
-    ------
-    RecordError
-        If the reference does not move, or does not move the input.
-    """
+    """Fit the part of an input that a reference moves, (n,): weights over its past, by Akaike."""
     if np.ptp(reference) == 0.0:
         raise RecordError(
             f"reference {name!r} is constant at {reference[0]:g}; it moves nothing, so leave it out"

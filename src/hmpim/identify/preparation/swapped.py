@@ -57,17 +57,6 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     correlation; the past of `y` alone predicts `u` better than the past of `u` alone predicts `y`,
     by a fifth, each relative to past and future; no other step contradicts; and `y` is no integral
     of `u`.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(1)
-    >>> t = np.arange(1000) / 100
-    >>> sweep = np.sin(2 * np.pi * (0.1 * t + 1.0 * t**2))
-    >>> lagging = np.convolve(sweep, 0.2 * 0.8 ** np.arange(60))[:1000]
-    >>> response = np.roll(lagging, 5) + 0.02 * rng.standard_normal(1000)
-    >>> valid = np.ones(1000, dtype=bool)
-    >>> is_swapped(sweep, response, valid), is_swapped(response, sweep, valid)
-    (False, True)
     """
     if np.count_nonzero(valid) < _FEWEST:
         return False

@@ -6,7 +6,7 @@ its phase does not wrap, and a straight line through the neighbours of a frequen
 difference between measurement and model there, and so the measured crossing.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
+from hmpim.identify.result.groups import BANDWIDTHS
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model import RationalDelay, response
 from hmpim.record import Intersample
@@ -26,8 +27,6 @@ _FEWEST = 5
 
 _BESIDE = 2
 """Least number of these on either side."""
-
-_NAMES = tuple(field.name for field in fields(ResponseBandwidths))
 
 
 def ratio_at(
@@ -86,7 +85,7 @@ def response_bandwidths(
     ratio of sampled spectra depends on what the input does between its samples; the bandwidths of
     the system do not.
     """
-    near = {name: e.value for name in _NAMES if (e := getattr(modelled, name)) is not None}
+    near = {name: e.value for name in BANDWIDTHS if (e := getattr(modelled, name)) is not None}
     if not near:
         return ResponseBandwidths()
     # Derivative of ln G by frequency, 1/Hz, without the delay: gain and phase.
@@ -131,7 +130,7 @@ def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
 
 def disagreeing(measured: ResponseBandwidths, modelled: Parameters) -> bool:
     """Whether any bandwidth of the response differs from the model's."""
-    return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in _NAMES)
+    return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in BANDWIDTHS)
 
 
 def less_bias(
@@ -149,4 +148,4 @@ def less_bias(
         bias = biased.value - true.value
         return estimate(found.value - bias, found.spread**2 + bias**2, unit="Hz")
 
-    return ResponseBandwidths(**{name: corrected(name) for name in _NAMES})
+    return ResponseBandwidths(**{name: corrected(name) for name in BANDWIDTHS})

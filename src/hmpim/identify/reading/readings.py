@@ -54,27 +54,19 @@ def read_parameters(
     highest: float,
     delay_correlation: float | None,
     known_covariance: Real | None = None,
-    input_unit: str,
-    output_unit: str,
+    units: tuple[str, str],
 ) -> Readings:
     """Turn the chosen fit into estimates.
 
-    Parameters
-    ----------
-    highest : float
-        Frequency in Hz beyond which no bandwidth is read off: the end of the excited band.
-    delay_correlation : float or None
-        The paper's delay (eq. 8), in s.
-    known_covariance : ndarray, shape (p, p), optional
-        Of the fit's parameters, where several inputs were fitted together.
+    No bandwidth is read off beyond `highest`, in Hz: the end of the excited band. The paper's delay
+    (eq. 8) is in s. `known_covariance`, (p, p), is that of the fit's parameters, where several
+    inputs were fitted together.
     """
     fit = joint.best.fit
     structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
-    if in_whole_samples(
-        structure, held=joint.best.intersample == "zoh"
-    ):  # the middle of the sample in which the delay ends
-        vector[0] = np.ceil(np.round(vector[0], 6)) - 0.5
+    if in_whole_samples(structure, held=joint.best.intersample == "zoh"):
+        vector[0] = np.ceil(np.round(vector[0], 6)) - 0.5  # the middle of its last sample
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
     residual = weighed.innovations(fit.prediction, fit.residual)
@@ -100,9 +92,9 @@ def read_parameters(
             fit.cost,
             freedom=max(joint.problem.counted - vector.size, 1),
             share=joint.effective_share * steadiness(weighed.as_loud(residual)),
-            unit=output_unit,
+            unit=units[1],
         ),
-        units=(input_unit, output_unit),
+        units=units,
     )
     return Readings(
         parameters=replace(parameters, delay_correlation=from_lag(delay_correlation, fs)),

@@ -22,7 +22,7 @@ from hmpim.identify.fitting.held_steps import at_ends, in_whole_samples
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
-from hmpim.identify.result.groups import EVERY, MODELLED, PHASE_SPLIT
+from hmpim.identify.result.groups import BANDWIDTHS, MODELLED, PHASE_SPLIT
 from hmpim.identify.worth import FEW, ROUNDING, TWICE
 
 __all__ = [
@@ -40,10 +40,7 @@ _STEP = 1e-6
 
 _TINY = float(np.finfo(float).tiny)
 
-_FAST = (
-    *("natural_frequency", "damping_ratio"),
-    *("bandwidth_phase90", "bandwidth_phase90_without_delay", "bandwidth_3db"),
-)
+_FAST = ("natural_frequency", "damping_ratio", *BANDWIDTHS)
 """Figures that grow without limit as a second pole becomes infinitely fast, bandwidths last."""
 
 
@@ -163,10 +160,7 @@ def spanned(
             richer += figures([as_if_zero(fit, hidden)])
     richer += [bent_figures(*change, fs=fs, highest=highest) for change in bent]
     moved = {}
-    for name in EVERY:
-        own = getattr(parameters, name)
-        if own is None:
-            continue
+    for name, own in parameters.given.items():
         whole, tail = _hull(own, _given(between, name)), _hull(own, _given(richer, name))
         if tail is not own and whole is own:  # a tail of one model, not a choice between several
             whole = replace(tail, std=tail.spread)
@@ -193,13 +187,12 @@ def blurred(parameters: Parameters, share: float) -> Parameters:
     In the presence of a nonlinearity no linear model is more exact.
     """
     moved = {}
-    for name in MODELLED:
-        own = getattr(parameters, name)
-        if own is None or own.ci95 is None or None in own.ci95 or name == "noise_std":
+    for name, own in parameters.given.items():
+        low, high = own.ci95 or (None, None)
+        if low is None or high is None or name not in MODELLED or name == "noise_std":
             continue
         size = 20.0 / np.log(10.0) if name == "peak_gain_db" else abs(own.value)
         room = float(share * size)
-        low, high = own.ci95
         wide = replace(own, std=None, ci95=(low - room, high + room))
         moved[name] = replace(wide, std=wide.spread)
     return replace(parameters, **moved)

@@ -1,35 +1,33 @@
 """Whether records are of one test: repeats, one stimulus at several levels, or one record twice."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.worth import FEW
-from hmpim.record import Aligned, Record, uniform
+from hmpim.record import Record, uniform
 
 __all__ = [
     "check_alike",
     "check_apart",
     "check_channels",
+    "each_named",
     "names_of",
     "naming",
     "same_at_levels",
 ]
+
+R = TypeVar("R")
 
 _SAME_RATE = 1e-3
 """Relative difference up to which the rates of two clocks are the same."""
 
 
 def names_of(records: Sequence[Record], names: Sequence[str] | None) -> tuple[str, ...]:
-    """Return what messages call the records: names in quotes, or numbers from 0.
-
-    Raises
-    ------
-    ArgumentError
-        If there is not one name for each record.
-    """
+    """Return what messages call the records: names in quotes, or numbers from 0."""
     if names is None:
         return tuple(f"record {k}" for k in range(len(records)))
     if len(names) != len(records):
@@ -51,6 +49,17 @@ def naming(name: str, *, arguments: bool = False) -> Iterator[None]:
         if not arguments:
             raise
         raise ArgumentError(f"{name}: {error}") from error
+
+
+def each_named(
+    function: Callable[[Record], R], records: Sequence[Record], called: Sequence[str]
+) -> list[R]:
+    """Apply a function to each record; a refusal begins with what the record is called."""
+    found = []
+    for name, record in zip(called, records, strict=True):
+        with naming(name):
+            found.append(function(record))
+    return found
 
 
 def same_at_levels(records: Sequence[Record], *, names: Sequence[str] | None = None) -> bool:
@@ -75,7 +84,7 @@ def same_at_levels(records: Sequence[Record], *, names: Sequence[str] | None = N
     >>> same_at_levels([small, large]), same_at_levels([small, small])
     (True, False)
     """
-    aligned = _aligned(records, names_of(records, names))
+    aligned = each_named(uniform, records, names_of(records, names))
     changed = False
     for other in aligned[1:]:
         if len(other.inputs) != len(aligned[0].inputs):
@@ -90,14 +99,6 @@ def same_at_levels(records: Sequence[Record], *, names: Sequence[str] | None = N
                 return False
             changed = changed or abs(factor - 1) > FEW
     return changed
-
-
-def _aligned(records: Sequence[Record], called: Sequence[str]) -> list[Aligned]:
-    aligned = []
-    for name, record in zip(called, records, strict=True):
-        with naming(name):
-            aligned.append(uniform(record))
-    return aligned
 
 
 def check_channels(records: Sequence[Record], called: Sequence[str]) -> None:
@@ -125,7 +126,7 @@ def check_alike(records: tuple[Record, ...], called: Sequence[str]) -> None:
     """Refuse records that are no repeats: other channels, rates or inputs."""
     check_channels(records, called)
     first = records[0]
-    aligned = _aligned(records, called)
+    aligned = each_named(uniform, records, called)
     for k, record in enumerate(records[1:], start=1):
         if abs(record.fs / first.fs - 1) > _SAME_RATE:
             raise RecordError(

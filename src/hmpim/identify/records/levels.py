@@ -16,10 +16,10 @@ from hmpim.arguments import checked
 from hmpim.errors import ArgumentError
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.identify import identify
-from hmpim.identify.records.alike import check_channels, names_of, naming
-from hmpim.identify.result import Identification, PairIdentification, Parameters
+from hmpim.identify.records.alike import check_channels, each_named, names_of
+from hmpim.identify.result import Identification, Parameters
 from hmpim.identify.result.digits import percent, plus_minus
-from hmpim.identify.result.groups import in_words
+from hmpim.identify.result.groups import BANDWIDTHS, in_words
 from hmpim.identify.worth import MATERIAL, WORTH
 from hmpim.model.dynamics import FILTERS, STRUCTURES
 from hmpim.record import Finding, Intersample, Record
@@ -31,9 +31,7 @@ _COMPARED = (
     "natural_frequency",
     "damping_ratio",
     "time_constant",
-    "bandwidth_phase90",
-    "bandwidth_phase90_without_delay",
-    "bandwidth_3db",
+    *BANDWIDTHS,
     "scale_factor",
     "delay",
 )
@@ -199,14 +197,18 @@ def identify_levels(
     ('nonlinear', 0.5)
     """
     given = tuple(records)
-    _check_number(len(given), len(given) if amplitudes is None else len(amplitudes), of="record")
+    if amplitudes is not None and len(amplitudes) != len(given):
+        raise ArgumentError(
+            f"{len(given)} records and {len(amplitudes)} amplitudes do not match; give one "
+            "amplitude for each"
+        )
+    if len(given) < 2:
+        raise ArgumentError(f"{len(given)} record has nothing to be compared with; give two")
     called = names_of(given, names)
     check_channels(given, called)
     linear = partial(identify, nonlinear="reported")
-    results = []
-    for name, record in zip(called, given, strict=True):
-        with naming(name):
-            results.append(linear(record, intersample=intersample, structures=structures))
+    alone = partial(linear, intersample=intersample, structures=structures)
+    results = each_named(alone, given, called)
     comparisons = []
     for pair in results[0].pairs:
         key = (pair.output, pair.input)
@@ -220,7 +222,7 @@ def identify_levels(
                 only = _only(first.structure)
                 again = linear(record, intersample=first.intersample, structures=only)
                 found = again[key]
-            alike.append(found)
+            alike.append(found.parameters)
         unit = given[0].channel(pair.input).unit if amplitudes is None else ""
         comparisons.append(compare_levels(alike, heights, unit=unit))
     return Levels(results=tuple(results), comparisons=tuple(comparisons))
@@ -232,30 +234,9 @@ def _only(structure: str) -> list[str]:
 
 
 def compare_levels(
-    results: Sequence[PairIdentification | Parameters],
-    amplitudes: Sequence[float],
-    *,
-    unit: str = "",
+    results: Sequence[Parameters], amplitudes: Sequence[float], *, unit: str = ""
 ) -> LevelComparison:
-    """Compare what was identified at several amplitudes of one stimulus.
-
-    Parameters
-    ----------
-    results : sequence of PairIdentification or Parameters
-        One per level.
-    amplitudes : sequence of float
-        One per level, positive; in any order.
-    unit : str
-        Of the amplitudes, for the sentences.
-
-    Returns
-    -------
-    LevelComparison
-
-    Raises
-    ------
-    ArgumentError
-        For fewer than two levels, unequal numbers, or an amplitude that is not positive.
+    """Compare what was identified at several amplitudes, in any order, all in one unit.
 
     Examples
     --------
@@ -267,7 +248,10 @@ def compare_levels(
     >>> [finding.code for finding in found.findings], found.linear_up_to
     (['nonlinear', 'hardening'], 1.0)
     """
-    levels = _levels(results, amplitudes)
+    for amplitude in amplitudes:
+        if not (np.isfinite(amplitude) and amplitude > 0):
+            raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
+    levels = sorted(zip(map(float, amplitudes), results, strict=True), key=lambda level: level[0])
     trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
     changed = [
         t for t in trends if t.probability * len(trends) < FALSE_ALARM and abs(t.change) > WORTH
@@ -275,7 +259,7 @@ def compare_levels(
     reach = _linear_up_to(levels, trends)
     kinds = _kind({t.name: t for t in changed})
     return LevelComparison(
-        amplitudes=tuple(float(a) for a in amplitudes),
+        amplitudes=tuple(map(float, amplitudes)),
         trends=trends,
         linear_up_to=reach,
         findings=(*_changes(changed, _linear_range(levels, reach, unit), unit), *kinds),
@@ -296,29 +280,6 @@ def _changes(changed: list[Trend], where: str, unit: str) -> Iterator[Finding]:
         severity="doubt",
         parameters=tuple(t.name for t in changed),
     )
-
-
-def _levels(
-    results: Sequence[PairIdentification | Parameters], amplitudes: Sequence[float]
-) -> list[_Level]:
-    """Amplitudes, the smallest first, and the parameters identified there."""
-    _check_number(len(results), len(amplitudes), of="level")
-    for amplitude in amplitudes:
-        if not (np.isfinite(amplitude) and amplitude > 0):
-            raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
-    parameters = (r.parameters if isinstance(r, PairIdentification) else r for r in results)
-    levels = zip(map(float, amplitudes), parameters, strict=True)
-    return sorted(levels, key=lambda level: level[0])
-
-
-def _check_number(count: int, amplitudes: int, *, of: str) -> None:
-    """Refuse numbers of results and amplitudes that do not go together, or a single level."""
-    if count != amplitudes:
-        raise ArgumentError(
-            f"{count} {of}s and {amplitudes} amplitudes do not match; give one amplitude for each"
-        )
-    if count < 2:
-        raise ArgumentError(f"{count} {of} has nothing to be compared with; give two")
 
 
 def _linear_range(levels: list[_Level], reach: float, unit: str) -> str:

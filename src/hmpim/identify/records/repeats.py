@@ -7,6 +7,7 @@ dynamics or nonlinearity that the model lacks (Pintelon and Schoukens, System Id
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -18,7 +19,7 @@ from hmpim.identify.chance import FALSE_ALARM, HALF
 from hmpim.identify.identify import identify
 from hmpim.identify.judgement import judged_together
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.records.alike import check_alike, check_apart, names_of, naming
+from hmpim.identify.records.alike import check_alike, check_apart, each_named, names_of
 from hmpim.identify.records.repeated import RepeatedPair, RepeatedParameter, Repeats
 from hmpim.identify.result import Estimate, FrequencyResponse, PairIdentification
 from hmpim.identify.result.error_bars import estimate, noise_estimate
@@ -87,10 +88,8 @@ def identify_repeats(
     called = names_of(given, names)
     check_alike(given, called)
     check_apart(given, called)
-    results = []
-    for name, record in zip(called, given, strict=True):
-        with naming(name):
-            results.append(identify(record, intersample=intersample, structures=structures))
+    alone = partial(identify, intersample=intersample, structures=structures)
+    results = each_named(alone, given, called)
     return Repeats(
         results=tuple(results),
         pairs=tuple(

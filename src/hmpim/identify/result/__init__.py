@@ -10,7 +10,7 @@ measured        frequency response, bandwidths read off it, nonlinearity
 inputs          several inputs at once, and how well they are distinguished
 pair            the result for one input and one output
 lookup          pairs by their names, output first
-powers          covariances by falling powers
+sizes           the size of a nonlinearity in words
 first_schema    results written by the first version
 identification  the whole result, and its JSON
 """

@@ -29,16 +29,8 @@ def noise_estimate(
 ) -> Estimate:
     """Standard deviation of the noise, its own error, and its interval (chi-squared).
 
-    Parameters
-    ----------
-    sum_of_squares : float
-        Of the residual.
-    freedom : int
-        Samples that counted less parameters.
-    share : float
-        Independent samples per sample, 1 for white noise.
-    unit : str
-        Of the output.
+    The sum of squares is that of the residual, `freedom` the number of samples that count less that
+    of the parameters, and `share` that of independent samples, 1 for white noise.
     """
     sigma = float(np.sqrt(sum_of_squares / freedom))
     effective = max(freedom * share, 1.0)

@@ -1,7 +1,7 @@
 """One figure: its value, its error, its interval, and whether to rely on it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 from hmpim.identify.chance import HALF
@@ -124,6 +124,13 @@ class Estimates(Plain):
     """Base of dataclasses of estimates."""
 
     __slots__ = ()
+
+    @property
+    def given(self) -> dict[str, Estimate]:
+        """The estimates that are not None, by name, in the order of the fields."""
+        holder: Any = self
+        named = ((each.name, getattr(holder, each.name)) for each in fields(holder))
+        return {name: estimate for name, estimate in named if estimate is not None}
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dictionary from names to estimates, null where a value is not finite."""

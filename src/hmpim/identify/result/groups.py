@@ -2,9 +2,20 @@
 
 from dataclasses import fields
 
+from hmpim.identify.result.measured import ResponseBandwidths
 from hmpim.identify.result.parameters import Parameters
 
-__all__ = ["EVERY", "FIXED_UNITS", "GAIN", "MODELLED", "PHASE_SPLIT", "TIMING", "in_words"]
+__all__ = [
+    "BANDWIDTHS",
+    "EVERY",
+    "FIXED_UNITS",
+    "GAIN",
+    "MODELLED",
+    "PHASE_SPLIT",
+    "SIZES",
+    "TIMING",
+    "in_words",
+]
 
 EVERY = tuple(f.name for f in fields(Parameters))
 """Every parameter."""
@@ -33,6 +44,12 @@ PHASE_SPLIT = (
 The response within the band does not depend on that, nor do gain, bandwidths that include the
 delay, and the slope of the phase at DC.
 """
+
+BANDWIDTHS = tuple(f.name for f in fields(ResponseBandwidths))
+"""Every bandwidth."""
+
+SIZES = ("scale_factor", "natural_frequency", "damping_ratio", "time_constant", *BANDWIDTHS)
+"""Parameters whose error is stated as a share of their value."""
 
 TIMING = ("delay", "delay_correlation", "delay_low_frequency", "bandwidth_phase90")
 """Parameters that change when the clock of one channel shifts against that of the other."""

@@ -22,19 +22,7 @@ P = TypeVar("P", bound=_Pair)
 def find_pair(pairs: Sequence[P], key: object, *, holder: str) -> P:
     """Return the pair of ``(output, input)``, or of an output alone that has one input.
 
-    Parameters
-    ----------
-    pairs : sequence
-        To look in.
-    key : (str, str) or str
-        Output and input, or the output.
-    holder : str
-        Owner of the pairs, for the message: 'the result'.
-
-    Raises
-    ------
-    RecordError
-        If there is no such pair, or an output alone leaves a choice of inputs.
+    A `RecordError` names the pairs of the `holder` if there is none, or a choice of inputs.
     """
     known = ", ".join(f"({p.output!r}, {p.input!r})" for p in pairs)
     if isinstance(key, tuple) and len(key) == 2:

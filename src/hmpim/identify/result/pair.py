@@ -1,7 +1,7 @@
 """The result for one input and one output."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, overload
 
 import numpy as np
@@ -106,7 +106,7 @@ class PairIdentification(ByValue, Plain):
     nonlinear_part: NonlinearPart | None = None
 
     def __repr__(self) -> str:
-        known = dict(_known(self.parameters))
+        known = self.parameters.given
         figures = [f"{name} {known[name]}" for name in _FIRST if name in known]
         what = ", ".join([self.structure, self.verdict, *figures])
         return f"PairIdentification({shortened([self.input])} → {shortened([self.output])}: {what})"
@@ -158,15 +158,10 @@ _FIRST = ("delay", "natural_frequency", "time_constant", "damping_ratio")
 """Figures that are shown on one line."""
 
 
-def _known(parameters: Parameters) -> list[tuple[str, Estimate]]:
-    named = ((each.name, getattr(parameters, each.name)) for each in fields(parameters))
-    return [(name, estimate) for name, estimate in named if estimate is not None]
-
-
 def pair_rows(pair: PairIdentification) -> list[list[str]]:
     """Name, value with its error, interval and verdict of each known figure."""
     rows = []
-    for name, estimate in _known(pair.parameters):
+    for name, estimate in pair.parameters.given.items():
         low, high = estimate.ci95 or (None, None)
         between = interval(low, high, value=estimate.value, std=estimate.std)
         rows.append([name.replace("_", " "), estimate.text, between, estimate.verdict])

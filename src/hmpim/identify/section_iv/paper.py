@@ -162,10 +162,7 @@ def paper_analysis(
     >>> analysis.estimates.delay, round(analysis.estimates.bias, 2)
     (0.15, 0.6)
     """
-    stimulus, measured = as_pair(u, y)
-    check_rate(fs)
-    fs = float(fs)
-    span = _band(stimulus, fs, band)
+    stimulus, measured, fs, span = _checked(u, y, fs, band)
     peak = likeness(stimulus, measured, longest_lag(stimulus.size)).peak
     if peak.value == 0.0:
         raise RecordError("the correlation is zero at every lag; one of the signals is dead")
@@ -219,10 +216,8 @@ def paper_estimates(
     >>> paper_estimates(u, np.roll(u, 30), fs=200.0).delay
     0.15
     """
-    stimulus, measured = as_pair(u, y)
-    check_rate(fs)
-    fs = float(fs)
-    return estimates_of_many(stimulus, [measured], fs, _band(stimulus, fs, band))[0]
+    stimulus, measured, fs, span = _checked(u, y, fs, band)
+    return estimates_of_many(stimulus, [measured], fs, span)[0]
 
 
 def estimates_of_many(
@@ -263,13 +258,18 @@ _input_spectrum = kept(_spectrum)
 """The same of a stimulus, kept since all its outputs need it."""
 
 
-def _band(u: Real, fs: float, band: tuple[float, float] | None) -> tuple[float, float]:
+def _checked(
+    u: ArrayLike, y: ArrayLike, fs: float, band: tuple[float, float] | None
+) -> tuple[Real, Real, float, tuple[float, float]]:
+    """Stimulus and response as samples, the rate, and the band, which is found if not given."""
+    (stimulus, measured), rate = as_pair(u, y), float(fs)
+    check_rate(rate)
     if band is None:
-        return excited_band(u, fs)
-    check_band(band, fs)
-    if np.ptp(u) == 0:
-        raise RecordError(f"u is constant at {u[0]:g}; a stimulus must move")
-    return band
+        return stimulus, measured, rate, excited_band(stimulus, rate)
+    check_band(band, rate)
+    if np.ptp(stimulus) == 0:
+        raise RecordError(f"u is constant at {stimulus[0]:g}; a stimulus must move")
+    return stimulus, measured, rate, band
 
 
 def _time_steps(u: Real, y: Real, peak: CorrelationPeak, fs: float) -> tuple[PaperEstimates, Real]:

@@ -136,20 +136,14 @@ def decibel(value: ArrayLike) -> Real:
 
 
 def transfer_function(
-    u: ArrayLike,
-    y: ArrayLike,
-    fs: float,
-    *,
-    window: WindowName = "gaussian",
-    alpha: float = 1.5,
-    pad: int | None = None,
+    u: ArrayLike, y: ArrayLike, fs: float, *, pad: int | None = None
 ) -> TransferFunction:
     """Return the paper's transfer function, equation (18): FFT(response) / FFT(stimulus).
 
-    Stimulus and response, (n,), are on one clock and get the same window and the same zeros.
-    Nothing is averaged or removed first. The ratio is meaningful only where the stimulus has
-    content, see `excited_band`. A late response is elsewhere under the window than its stimulus,
-    which makes the window a disadvantage. The other arguments and the errors are as in `spectrum`.
+    Stimulus and response, (n,), are on one clock and get the paper's window and the same zeros, as
+    in `spectrum`. Nothing is averaged or removed first. The ratio is meaningful only where the
+    stimulus has content, see `excited_band`. A late response is elsewhere under the window than its
+    stimulus, which makes the window a disadvantage.
 
     Examples
     --------
@@ -158,9 +152,7 @@ def transfer_function(
     >>> bool(np.allclose(g.response, -2))
     True
     """
-    stimulus, response = as_pair(u, y)
-    below = spectrum(stimulus, fs, window=window, alpha=alpha, pad=pad)
-    above = spectrum(response, fs, window=window, alpha=alpha, pad=pad)
+    below, above = (spectrum(x, fs, pad=pad) for x in as_pair(u, y))
     return TransferFunction(frequency=below.frequency, response=ratio(above.value, below.value))
 
 

@@ -8,6 +8,7 @@ may have. Under any linear system the gain is chi-squared. The cube of a binary 
 itself, so that nothing can be tested.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +29,7 @@ from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import FEW, MUCH
 from hmpim.record import Finding
 
-__all__ = ["UNDELAYED", "beyond_of", "has_cubes", "held_for", "nonlinear_findings"]
+__all__ = ["TIMED", "beyond_of", "has_cubes", "held_for", "nonlinear_findings"]
 
 _GROUPS = 5
 """Frequencies that are tested, from 0 to the highest of the cube."""
@@ -40,8 +41,8 @@ _SEEN = 1e-6
 """Share of a direction's power, below which the input's own responses explain it and it is not
 tested."""
 
-UNDELAYED = ("scale_factor", "bias")
-"""Figures of slow motion, which a held output shows without error."""
+TIMED = tuple(name for name in MODELLED if name not in ("scale_factor", "bias"))
+"""Figures of fast motion; a held output shows those of slow motion without error."""
 
 _FEWEST = 10
 """Values that an output must have kept before it counts as held."""
@@ -80,7 +81,7 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     almost_binary = float(np.mean(np.diag(left) / size)) < MUCH  # its edges are between the samples
     power, determined = explained(left, gain, least=_SEEN, size=size)
     if almost_binary or not determined or cost <= 0.0:
-        return Misfit(share=0.0, within=0.0, probability=1.0)
+        return Misfit()
     freedom = products.counted - linear.rows.shape[0] - int(determined)
     return explained_by(float(power), int(determined), cost, freedom)
 
@@ -110,7 +111,7 @@ def held_for(statistics: Statistics) -> float | None:
 
 def nonlinear_findings(
     statistics: Statistics, found: Misfit | None, evidence: Evidence
-) -> tuple[Finding, ...]:
+) -> Iterator[Finding]:
     """Report a held output, and a residual that follows the cube of the input.
 
     A linear fit absorbs the part of a distortion at the input's own frequency, which is `_TIMES`
@@ -118,34 +119,28 @@ def nonlinear_findings(
     doubted. Nothing is reported where no cube is kept and `found` is None.
     """
     if found is None:
-        return ()
-    findings = []
+        return
     period = held_for(statistics)
     if period is not None:
-        findings.append(
-            Finding(
-                code="held_output",
-                message=f"The output keeps each of its values for {period:.3g} samples "
-                f"({period / statistics.fs:.3g} s): it is updated by a slower clock. Statistics do "
-                "not record the update times, so delay and dynamics include the hold. Identify "
-                "the record itself.",
-                severity="doubt",
-                parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
-            )
+        yield Finding(
+            code="held_output",
+            message=f"The output keeps each of its values for {period:.3g} samples "
+            f"({period / statistics.fs:.3g} s): it is updated by a slower clock. Statistics do "
+            "not record the update times, so delay and dynamics include the hold. Identify "
+            "the record itself.",
+            severity="doubt",
+            parameters=TIMED,
         )
     if found.probability < FALSE_ALARM:
         size = float(np.sqrt(found.share)) * evidence.unexplained
         moved = moved_by(evidence, _TIMES**2 * found.share)
-        findings.append(
-            Finding(
-                code="nonlinear",
-                message="The residual is correlated with the cube of the input, which no linear "
-                f"system causes. Odd harmonics are {percent(size)} % of the output (r.m.s.); the "
-                "linear model absorbs several times as much distortion. It may be friction, "
-                "backlash, a dead zone, a limited speed or clipping. Identify the record itself to "
-                "see which.",
-                severity="doubt" if moved else "info",
-                parameters=moved or MODELLED,
-            )
+        yield Finding(
+            code="nonlinear",
+            message="The residual is correlated with the cube of the input, which no linear "
+            f"system causes. Odd harmonics are {percent(size)} % of the output (r.m.s.); the "
+            "linear model absorbs several times as much distortion. It may be friction, "
+            "backlash, a dead zone, a limited speed or clipping. Identify the record itself to "
+            "see which.",
+            severity="doubt" if moved else "info",
+            parameters=moved or MODELLED,
         )
-    return tuple(findings)

@@ -8,19 +8,7 @@ from hmpim.errors import RecordError
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
-from hmpim.identify.judgement.between_samples import other_intersample, wide_span
-from hmpim.identify.judgement.checks import Check
-from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_excitation
-from hmpim.identify.judgement.reach import (
-    beyond_band,
-    fast_mode,
-    initial_transient,
-    integrator,
-    natural_frequency_beyond,
-    negative_delay,
-)
-from hmpim.identify.judgement.residual import lack_of_fit
-from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.judgement.checks import COMPRESSED
 from hmpim.identify.judgement.verdict import unfollowed
 from hmpim.identify.reading.candidates import candidates_of
 from hmpim.identify.reading.coefficients import coefficients_of, highest_first
@@ -41,7 +29,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.statistics.beyond import has_cubes, nonlinear_findings
 from hmpim.identify.statistics.choose import CompressedData, choose, integrator_of
 from hmpim.identify.statistics.fit import Fitted, as_fitted
-from hmpim.identify.statistics.limits import cut_response, drift_or_noise, perhaps_software
+from hmpim.identify.statistics.limits import LIMITS
 from hmpim.identify.statistics.run import Run
 from hmpim.identify.statistics.start import correlations
 from hmpim.identify.statistics.statistics import Statistics
@@ -50,27 +38,6 @@ from hmpim.model.response import response, response_std, slowest_time_constant
 from hmpim.record import Finding, Intersample
 
 __all__ = ["identify_statistics"]
-
-_CHECKS: tuple[Check, ...] = (
-    initial_transient,
-    lack_of_fit,
-    not_converged,
-    weak_excitation,
-    weak_delay,
-    fast_mode,
-    natural_frequency_beyond,
-    integrator,
-    beyond_band,
-    other_order,
-    missed_pole,
-    other_intersample,
-    wide_span,
-    negative_delay,
-    drift_or_noise,
-    cut_response,
-    perhaps_software,
-)
-"""Checks that need no samples."""
 
 _OVER = 1e-3
 """Greatest response at the end of the window, as a share of the impulse response's peak."""
@@ -92,15 +59,8 @@ def identify_statistics(
 ) -> Identification:
     """Identify one pair from compressed records.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        From `hmpim.compress`.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
-        What the input does between its samples; by default as the statistics state it, or the
-        likeliest.
-    structures : tuple of str, optional
-        Structures to try; all by default. Integrators are tried in any case, and refused.
+    The input between its samples is by default as the statistics state it, or the likeliest, and
+    all structures are tried; integrators are tried in any case, and refused.
 
     Raises
     ------
@@ -203,7 +163,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         fit_percent=percent(best),
         measured=ResponseBandwidths(),
     )
-    findings, parameters = judge(evidence, checks=_CHECKS), readings.parameters
+    findings, parameters = judge(evidence, checks=(*COMPRESSED, *LIMITS)), readings.parameters
     if evidence.is_without_noise:
         parameters = without_noise(parameters, _DIGITS)
     else:

@@ -9,14 +9,13 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.noise.autoregression import spectrum_of_filter
-from hmpim.identify.result.groups import MODELLED
-from hmpim.identify.statistics.beyond import UNDELAYED
+from hmpim.identify.statistics.beyond import TIMED
 from hmpim.identify.statistics.fit import Compressed, as_fitted, pulse
 from hmpim.identify.statistics.products import Responses
 from hmpim.identify.worth import FEW, MOST
 from hmpim.record import Finding
 
-__all__ = ["cut_response", "drift_or_noise", "perhaps_software"]
+__all__ = ["LIMITS"]
 
 _FREQUENCIES = 2_000
 _SLOWEST = 1e-7
@@ -88,5 +87,9 @@ def perhaps_software(evidence: Evidence) -> Iterator[Finding]:
         "has another delay and other bandwidths than one pole behind a held input. Identify "
         "the record itself, with intersample='sampled' if it is software.",
         severity="doubt",
-        parameters=tuple(name for name in MODELLED if name not in UNDELAYED),
+        parameters=TIMED,
     )
+
+
+LIMITS = (drift_or_noise, cut_response, perhaps_software)
+"""The checks for statistics alone."""

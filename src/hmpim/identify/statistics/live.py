@@ -167,13 +167,7 @@ class LiveEstimator:
         return self.look()
 
     def read(self, u: ArrayLike, y: ArrayLike) -> None:
-        """Read the samples that follow, without a look; this takes almost no time.
-
-        Parameters
-        ----------
-        u, y : array_like, shape (n,)
-            As for `update`.
-        """
+        """Read the samples that follow, as `update` does, without a look; this is fast."""
         self._statistics.update(u, y)
 
     def look(self) -> Look | None:

@@ -81,18 +81,10 @@ class Remainder(NamedTuple):
 class Products:
     """Products over the samples that count, under one noise model.
 
-    Parameters
-    ----------
-    statistics : Statistics
-        What was read.
-    skipped : int
-        First outputs of each run that do not count, since they depend on earlier input, at most
-        `lags`; 0 where each run begins at rest.
-    noise : ndarray, shape (order + 1,)
-        Autoregression of the noise, 1 first.
-    to_the_end : bool
-        Whether the last `AHEAD` outputs of each run count. A band-limited input is continued there,
-        odd about its last sample; an input that ends in motion rings there.
+    The first `skipped` outputs of each run, at most `lags`, do not count, since they depend on
+    earlier input; 0 where each run begins at rest. Nor do the last `AHEAD`, unless `to_the_end`: a
+    band-limited input is continued there, odd about its last sample; an input that ends in motion
+    rings there. `noise`, (order + 1,), is the autoregression of the noise, 1 first.
     """
 
     def __init__(

@@ -161,7 +161,7 @@ class Statistics(ByValue):
             self._check(other, bias is None)
         if chosen == "common" and self.reach.rows > 1:
             raise ArgumentError(
-                f"a bias with {self.reach.rows} knots belongs to one run; join with bias='own', or "
+                f"a bias with {self.reach.rows} knots belongs to one run; take bias='own', or "
                 "compress without knots"
             )
         every = (self, *others)
@@ -276,10 +276,6 @@ def compress(
     places = tuple(round(knot * aligned.fs) for knot in knots)
     if any(b <= a for a, b in pairwise(places)):
         raise ArgumentError(f"knots = {list(knots)} do not increase; give times in s, in order")
-    if bias == "common" and len(places) > 1:
-        raise ArgumentError(
-            f"a bias with {len(places)} knots belongs to one run; take bias='own', or no knots"
-        )
     statistics = Statistics(
         fs=aligned.fs,
         reach=Reach(lags=lags, knots=places or (0,)),
@@ -288,9 +284,8 @@ def compress(
         units=(source.unit, answer.unit),
         intersample=aligned.intersample,
         band=record.band,
-        bias=bias,
     )
-    return statistics.update(source.values, answer.values)
+    return statistics.join(bias=bias).update(source.values, answer.values)
 
 
 def _named(signals: tuple[Signal, ...], name: str | None, role: str) -> Signal:

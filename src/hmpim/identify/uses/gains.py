@@ -24,7 +24,7 @@ def check_units(pair: PairIdentification, aligned: Aligned) -> None:
     """Refuse a record in other units than the result's, where both state them."""
     u, y = aligned.signal(pair.input), aligned.signal(pair.output)
     known = pair.parameters
-    if known.bias is None or known.scale_factor is None or pair.structure is None:
+    if known.bias is None or known.scale_factor is None:
         return
     if not (known.bias.unit and u.unit and y.unit):
         return
