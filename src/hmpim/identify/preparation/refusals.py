@@ -6,6 +6,7 @@ from typing import cast, get_args
 import numpy as np
 
 from hmpim.errors import ArgumentError, RecordError
+from hmpim.identify.fitting.enrich import MODES
 from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Intersample, Record
 
@@ -43,9 +44,8 @@ def checked_structures(
     wanted = tuple(structures) if structures is not None else tuple(known)
     for name in wanted:
         if name not in known:
-            raise ArgumentError(
-                f"structure {str(name)!r} is not known; choose one of {', '.join(known)}"
-            )
+            every = ", ".join(known).replace(", ".join(MODES[:-1]), "…")
+            raise ArgumentError(f"structure {str(name)!r} is not known; choose one of {every}")
     return cast(tuple[StructureName, ...], wanted)
 
 
