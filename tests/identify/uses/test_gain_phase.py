@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
+from scipy.signal import freqz, lfilter
 
 import hmpim
 from hmpim.identify import gain_and_phase
@@ -109,3 +110,14 @@ def test_an_integrator_starts_from_a_quarter_turn_and_ends_elsewhere(seed):
             (at.gain_db, gain),
         ):
             assert abs(value.value - truth) < 4.5 * value.std
+
+
+def test_a_tracker_whose_last_coefficient_is_zero():
+    """An alpha-beta tracker: fitted with two zeros, of which it has one."""
+    above, below = [0.5, -0.3], [1.0, -1.3, 0.5]
+    u = np.random.default_rng(0).standard_normal(400)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": lfilter(above, below, u)}, fs=100.0)
+    pair = hmpim.identify(record, intersample="sampled")["y", "u"]
+    (at,) = gain_and_phase(pair, 7.0, fs=100.0)
+    truth = 20 * np.log10(abs(freqz(above, below, [7.0], fs=100.0)[1][0]))
+    assert at.model_gain_db.value == pytest.approx(truth, abs=1e-9)

@@ -102,15 +102,23 @@ def gain_and_phase(
         fs=fs,
     ).system
     if system.step is not None:
-        above, below = _shortened(system.numerator), _shortened(system.denominator)
-        system = replace(system, numerator=above, denominator=below)
+        system = _as_fitted(system, len(pair.covariance))
     return tuple(_at(pair, float(f), system, pair.covariance, fs) for f in places)
 
 
-def _shortened(rising: Real) -> Real:
-    """Coefficients of powers of 1 - 1/z without the last zeros, which only powers of z need."""
-    last = np.flatnonzero(np.abs(rising) > 1e-12 * np.abs(rising).max())[-1]
-    return rising[: last + 1]
+def _as_fitted(system: RationalDelay, parameters: int) -> RationalDelay:
+    """A filter without the last zeros that only powers of z need, of so many parameters.
+
+    They are the delay and the coefficients but the denominator's first, of powers of 1 - 1/z. A
+    fitted coefficient may be zero as well.
+    """
+    above, below = system.numerator, system.denominator
+    while above.size + below.size > parameters:
+        ends = [
+            abs(one[-1]) / np.abs(one).max() if one.size > 1 else np.inf for one in (above, below)
+        ]
+        above, below = (above[:-1], below) if ends[0] < ends[1] else (above, below[:-1])
+    return replace(system, numerator=above, denominator=below)
 
 
 def measurable(frequency: ArrayLike, fs: float) -> Real:
