@@ -334,14 +334,17 @@ def nonlinear_facts(pair: PairIdentification) -> list[tuple[str, str]]:
     ...     share=0.02, even=0.0, odd=0.02, noise=0.7, linear=0.1, nonlinear=0.2,
     ...     kinds=("friction", "backlash"))
     >>> warned = (Finding(code="nonlinear", message="…", severity="info", parameters=()),)
-    >>> nonlinear_facts(SimpleNamespace(nonlinearity=found, warnings=warned))[2]
+    >>> pair = SimpleNamespace(nonlinearity=found, warnings=warned, nonlinear_part=None)
+    >>> nonlinear_facts(pair)[2]
     ('Kind', 'friction or backlash; this record does not show which')
     """
     found = pair.nonlinearity
     if found is None or not any(warning.code == "nonlinear" for warning in pair.warnings):
         return []
     kind = " or ".join(name.replace("_", " ") for name in found.kinds)
-    if len(found.kinds) > 1:
+    if pair.nonlinear_part is not None:
+        kind = f"{pair.nonlinear_part.kind.replace('_', ' ')}, in the model"
+    elif len(found.kinds) > 1:
         kind += "; this record does not show which"
     elif found.size is not None:
         kind += f", size {format_estimate(found.size)}"

@@ -136,7 +136,9 @@ def _general(
     noise, linear, nonlinear = (100 * share for share in shares.values())
     share, effect = outcome.rms / output, outcome.effect / output
     names = [KIND_WORDS[mechanism.kind] for mechanism in outcome.named]
-    if len(names) == 1:
+    if modelled:
+        guess = "The model includes it."
+    elif len(names) == 1:
         guess = f"It looks like {names[0]}."
     elif names:
         guess = f"It may be {' or '.join(names)}; this record does not show which."
@@ -150,8 +152,7 @@ def _general(
     at = f": {' and '.join(where)}" if where else ""
     found = f"{percent(share)} % of the output (r.m.s.) is nonlinear{at}. {guess}"
     if modelled:
-        message = f"{found} The model includes it."
-        return Finding(code="nonlinear", message=message, severity="info", parameters=())
+        return Finding(code="nonlinear", message=found, severity="info", parameters=())
     split = f"Of the residual's power {nonlinear:.0f} % is nonlinear and {noise:.0f} % noise"
     if outcome.harmonics is None:  # only a sweep distinguishes missing dynamics from noise
         split += " or dynamics left out"
