@@ -12,7 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit, lead, started
+from hmpim.identify.fits import fit, started
 from hmpim.identify.fitting.course import completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -62,13 +62,16 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
     return lead
 
 
-def fit_with_row(question: Question, seen: Imperfections) -> OutputFit | None:
+def fit_with_row(
+    question: Question, seen: Imperfections, i: int, joint: JointFit
+) -> OutputFit | None:
     """Fit all inputs with a nonlinearity of the leading one, if that leaves noise at once.
+
+    That is the input at `i`, and `joint` its plain fit.
 
     Plain dynamics that leave noise with it end the search, as they do with a drift: richer ones,
     couplings and drifts would only imitate it. None otherwise.
     """
-    i, joint = lead(question, seen)
     if not joint.related or joint.best.fit.cost > FEW**2 * joint.problem.spread:
         return None  # others move it too
     alone = _alone(question, i, question.output.values)
