@@ -33,7 +33,7 @@ from hmpim.identify.nonlinear.modelled import (
 )
 from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, TWICE
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
@@ -191,6 +191,8 @@ def _with_rows(
     """Fit each kind's row; the fit without it is also without a drift that the row replaces.
 
     `others`, (n,), is what other inputs move the output by; the output of `question` is without it.
+    Once a kind leaves noise, one whose row leaves more than twice as much is given up: no dynamics
+    would make up for that.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     if question.exact or is_explained(joint):
@@ -211,16 +213,21 @@ def _with_rows(
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
+        least = np.inf  # power of the noise that another kind leaves
         while kinds:
             kind = next(iter(kinds))
             begun = kinds.pop(kind)
-            one = _likeliest(
+            one, left = _likeliest(
                 kind, command, problem, begun, leading, joint.problem, count, seen.rounding
             )
-            beside = None if one is None else _fitted_with(steady, seen, problem, one)
+            beside = None
+            if one is not None and left < TWICE * least:
+                beside = _fitted_with(steady, seen, problem, one)
             if one is not None and beside is not None and beside.related:
                 gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
                 yield gain, one, beside, other
+                if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding):
+                    least = min(least, beside.best.fit.cost / beside.problem.counted)
                 if beside.best.fit.is_white:
                     continue
             play, friction = ALIKE
@@ -259,11 +266,12 @@ def _likeliest(
     former: Problem,
     count: int,
     rounding: float,
-) -> Nonlinearity | None:
-    """The row of a kind that gains most in Schwarz's criterion, if any does.
+) -> tuple[Nonlinearity | None, float]:
+    """The row of a kind that gains most in Schwarz's criterion, if any does, and what it leaves.
 
     With the dynamics of its start, or, unless it acts within these, with those that lead. Of
     friction, no other lag is tried once it leaves noise; no further start once the noise is white.
+    The second value is the power of the residual.
     """
     best, white = joint.best.fit, False
     found: Nonlinearity | None = None
@@ -283,4 +291,4 @@ def _likeliest(
                 break
         if white:
             break
-    return found
+    return found, lead.cost / led.counted
