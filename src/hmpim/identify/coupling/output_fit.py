@@ -28,7 +28,7 @@ from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
-from hmpim.identify.fitting.course import bridged
+from hmpim.identify.fitting.course import Course, bridged
 from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
@@ -68,6 +68,7 @@ class OutputFit:
     gaining: GainChange | None = None  # a gain that changes, with one input only
     bending: Modelled | None = None  # a nonlinearity that the model includes
     bent: int = 0  # the input whose response has it
+    begun: Course | None = None  # plain fits of the only input with a constant bias, if kept
 
     @property
     def prediction(self) -> Real:
