@@ -325,7 +325,7 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
 
     for i, step in enumerate(_stable_steps(fit, scale)):
         if not step:
-            continue  # at the edge of the structure, or the bias
+            continue  # at the edge of the structure
         aside = np.zeros(vector.size)
         aside[i] = step
         out[i] = (effect(vector + aside) - effect(vector - aside)) / (2.0 * step)
@@ -333,13 +333,9 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
 
 
 def _stable_steps(fit: Fit, steps: Real) -> Real:
-    """Steps of theta to either side of which the model is stable and of like dynamics, (p + 1,).
-
-    0 for the bias, which moves no nonlinear effect.
-    """
+    """Steps of theta to either side of which the model is stable and of like dynamics, (p + 1,)."""
     out, start = steps.copy(), 1
     out[0] = min(out[0], 1.0)  # of the delay: a sample
-    out[fit.theta.size + fit.linear.size - 1] = 0.0
     for order in fit.structure.sections:
         out[start] = min(out[start], PART)  # a logarithm
         if order == 2:
