@@ -143,9 +143,10 @@ class _Unit:
         thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
         self.pull = self._pull(rubbing, thrust)
         self.known = np.stack([x, self.speed, thrust, self.pull], axis=1)
-        self.within = list(_powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS))
-        moved = _powers(self.within[_PARTS], _AHEAD)
-        self.moved = list(moved)
+        within = _powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS)
+        moved = _powers(within[_PARTS], _AHEAD)
+        self.within: list[_Real] = list(within)  # a list is indexed faster
+        self.moved: list[_Real] = list(moved)
         self.shifts, self.speeds = (np.ascontiguousarray(moved[:, k]) for k in (0, 1))
         self.against = -self.speed  # speed of z - x at which the unit is at rest
         self.fades = np.exp(-_STEP / self.lag) if self.lag else 0.0
