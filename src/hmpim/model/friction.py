@@ -273,7 +273,8 @@ class _Unit:
 
     def _later(self, state: _Real, share: float) -> _Real:
         """The state after a share of a step."""
-        return self.within[round(share * _PARTS)].dot(state)
+        later: _Real = self.within[round(share * _PARTS)].dot(state)
+        return later
 
 
 def _powers(step: _Real, most: int) -> _Real:
