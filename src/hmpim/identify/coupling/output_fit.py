@@ -155,11 +155,26 @@ def fit_together(
         drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
             return drifting
+    richly = partial(fitted, structures=structures, shared=True)
+    _fit_in_turns(inputs, pairs, plainly, richly, coupled)
+    if pairs.demote():
+        _fit_couplings(inputs, pairs, coupled)
+    return _moved_at_once(pairs)
+
+
+def _fit_in_turns(
+    inputs: list[Real],
+    pairs: Pairs,
+    plainly: Callable[..., JointFit],
+    richly: Callable[..., JointFit],
+    coupled: tuple[StructureName, ...],
+) -> None:
+    """Fit the strong inputs and the couplings, in place, until moving all at once gains little."""
     least = pairs.cost
     _fit_couplings(inputs, pairs, coupled)
     for _ in range(_TURNS):
         before = pairs.structures
-        _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
+        _fit_strong(inputs, pairs, richly)
         cost = pairs.cost
         pairs.refine(pairs.kept, None)
         clearer = pairs.cost * TWICE < least
@@ -172,9 +187,6 @@ def fit_together(
             pairs.refine(pairs.kept, None)
         if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
-    if pairs.demote():
-        _fit_couplings(inputs, pairs, coupled)
-    return _moved_at_once(pairs)
 
 
 def fit_leading(
