@@ -6,14 +6,14 @@ from operator import itemgetter
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit, lead, started
-from hmpim.identify.fitting.course import completed, turn_ahead
+from hmpim.identify.fits import counted_in, fit, started
+from hmpim.identify.fitting.course import Course, completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -33,7 +33,7 @@ from hmpim.identify.nonlinear.modelled import (
 )
 from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import FEW
+from hmpim.identify.worth import FEW, TWICE
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
@@ -62,13 +62,16 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
     return lead
 
 
-def fit_with_row(question: Question, seen: Imperfections) -> OutputFit | None:
+def fit_with_row(
+    question: Question, seen: Imperfections, i: int, joint: JointFit
+) -> OutputFit | None:
     """Fit all inputs with a nonlinearity of the leading one, if that leaves noise at once.
+
+    That is the input at `i`, and `joint` its plain fit.
 
     Plain dynamics that leave noise with it end the search, as they do with a drift: richer ones,
     couplings and drifts would only imitate it. None otherwise.
     """
-    i, joint = lead(question, seen)
     if not joint.related or joint.best.fit.cost > FEW**2 * joint.problem.spread:
         return None  # others move it too
     alone = _alone(question, i, question.output.values)
@@ -188,6 +191,8 @@ def _with_rows(
     """Fit each kind's row; the fit without it is also without a drift that the row replaces.
 
     `others`, (n,), is what other inputs move the output by; the output of `question` is without it.
+    Once a kind leaves noise, one whose row leaves more than twice as much is given up: no dynamics
+    would make up for that.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     if question.exact or is_explained(joint):
@@ -201,28 +206,51 @@ def _with_rows(
         attempts.append((replace(fitted, drifting=None), question.output.values, None))
     for other, y, rows in attempts:
         steady = replace(question, output=replace(question.output, values=y))
-        course = completed(turn_ahead(started(steady, seen, rows)))
+        course = _plain(steady, seen, rows, fitted.begun)
         problem = course.problem
         count = 1 - (joint.problem.fixed().shape[0] - problem.fixed().shape[0])
         leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
+        least = np.inf  # power of the noise that another kind leaves
         while kinds:
             kind = next(iter(kinds))
             begun = kinds.pop(kind)
-            one = _likeliest(
+            one, left = _likeliest(
                 kind, command, problem, begun, leading, joint.problem, count, seen.rounding
             )
-            beside = None if one is None else _fitted_with(steady, seen, problem, one)
+            beside = None
+            if one is not None and left < TWICE * least:
+                beside = _fitted_with(steady, seen, problem, one)
             if one is not None and beside is not None and beside.related:
                 gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
                 yield gain, one, beside, other
+                if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding):
+                    least = min(least, beside.best.fit.cost / beside.problem.counted)
                 if beside.best.fit.is_white:
                     continue
             play, friction = ALIKE
             if kind == play:  # the plain fit first
                 kinds[friction] = [*begun, *kinds.pop(friction, [])]
+
+
+def _plain(
+    question: Question, seen: Imperfections, rows: Real | None, known: Course | None
+) -> Course:
+    """Plain fits of one input, which are `known` if the search began with the same data."""
+    if known is not None and rows is None:
+        counts, y = counted_in(question, seen), question.output.values
+        if np.array_equal(known.data.y, y) and _count_alike(known.given.valid, counts):
+            return known
+    return completed(turn_ahead(started(question, seen, rows)))
+
+
+def _count_alike(one: Mask | None, other: Mask | None) -> bool:
+    """Whether the same samples count; all if None."""
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def _fitted_with(
@@ -256,11 +284,12 @@ def _likeliest(
     former: Problem,
     count: int,
     rounding: float,
-) -> Nonlinearity | None:
-    """The row of a kind that gains most in Schwarz's criterion, if any does.
+) -> tuple[Nonlinearity | None, float]:
+    """The row of a kind that gains most in Schwarz's criterion, if any does, and what it leaves.
 
     With the dynamics of its start, or, unless it acts within these, with those that lead. Of
     friction, no other lag is tried once it leaves noise; no further start once the noise is white.
+    The second value is the power of the residual.
     """
     best, white = joint.best.fit, False
     found: Nonlinearity | None = None
@@ -280,4 +309,4 @@ def _likeliest(
                 break
         if white:
             break
-    return found
+    return found, lead.cost / led.counted

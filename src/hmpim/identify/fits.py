@@ -7,7 +7,13 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.coupling.output_fit import OutputFit, fit_in_motion, fit_leading, fit_together
+from hmpim.identify.coupling.output_fit import (
+    Led,
+    OutputFit,
+    fit_in_motion,
+    fit_leading,
+    fit_together,
+)
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
@@ -35,6 +41,7 @@ from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.modelled import is_explained
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
@@ -45,15 +52,18 @@ _CLEAR = 8
 """Bins between a constant and a line: in the window's spectrum each is four wide on either side."""
 
 
-def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
+def fit(
+    question: Question, seen: Imperfections, led: Led | None = None
+) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual requires them.
 
     If plain dynamics with levels or with a drift leave white noise, richer ones are not tried: they
-    would only imitate the effect. The levels found are returned with the fit.
+    would only imitate the effect. The levels found are returned with the fit. `led` is what `lead`
+    found, if it is known.
     """
     begun = _begin(question, seen)
     if begun is None:
-        return seen, _fit_and_look_for_rows(question, seen)
+        return seen, _fit_and_look_for_rows(question, seen, led)
     course = completed(begun)
     if not begun.best.is_white:
         levelled = _behind_levels(question, seen, begun, rests=course.counted.begins is None)
@@ -61,11 +71,15 @@ def fit(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputF
             return levelled
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
-        return seen, drifting
+        return seen, _keeping(course, drifting)
     freed = free_from_wander(begun)
-    if freed is not begun:
-        course = completed(freed)
-    return seen, _fit_and_look_for_rows(question, seen, course)
+    calm = course if freed is begun else completed(freed)
+    return seen, _keeping(course, _fit_and_look_for_rows(question, seen, calm))
+
+
+def _keeping(course: Course, fitted: OutputFit) -> OutputFit:
+    """The fit with the plain fits, if a nonlinearity may be sought from them."""
+    return fitted if is_explained(fitted.fits[0]) else replace(fitted, begun=course)
 
 
 def _behind_levels(
@@ -119,11 +133,12 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
 
 
 def _fit_and_look_for_rows(
-    question: Question, seen: Imperfections, begun: Course | None = None
+    question: Question, seen: Imperfections, begun: Course | Led | None = None
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
     software = question.intersample == "sampled"
-    fit_drift = None if software else partial(_plain_beside_drift, question, seen)
+    led = begun if isinstance(begun, tuple) else None
+    fit_drift = None if software else partial(_plain_beside_drift, question, seen, led)
     fitted = fit_once(question, seen, question.structures, begun=begun, fit_drift=fit_drift)
     if fitted.drifting is not None or fitted.fits[0].silent:
         return fitted
@@ -219,11 +234,11 @@ def _as_before(
 
 
 def _plain_beside_drift(
-    question: Question, seen: Imperfections, asked: int, first: JointFit
+    question: Question, seen: Imperfections, led: Led | None, asked: int, first: JointFit
 ) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `first` is the plain fit to the leading input, `asked`.
+    `first` is the plain fit to the leading input, `asked`; `led` is what `lead` found, if known.
     """
     plain = OutputFit(fits=(first,))
     freed: OutputFit | None = None
@@ -244,7 +259,7 @@ def _plain_beside_drift(
     drifting = found[1]
     if drifting is None:
         return freed
-    steady = fit_once(question, seen, question.plain)
+    steady = fit_once(question, seen, question.plain, begun=led)
     former = steady.fits[asked]
     if former.best.fit.is_white and steady.slow is None:
         return None
@@ -314,7 +329,7 @@ def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
 
 
-def lead(question: Question, seen: Imperfections) -> tuple[int, JointFit]:
+def lead(question: Question, seen: Imperfections) -> Led:
     """Plain fit of the input that the output follows most, and its place."""
     fitted = partial(
         joint_fit,
@@ -333,17 +348,18 @@ def fit_once(
     structures: tuple[StructureName, ...],
     rows: Real | None = None,
     *,
-    begun: Course | None = None,
+    begun: Course | Led | None = None,
     excluded: Mapping[int, JointFit] | None = None,
     fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
     leading_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
-    The search continues from `begun`, if the plain fits to a single input are known. Inputs in
-    `excluded` are not fitted; `fit_drift` and `leading_only` are as for `fit_together`.
+    The search continues from `begun`, if it is known: the plain fits to a single input, or what
+    `lead` found of several. Inputs in `excluded` are not fitted; `fit_drift` and `leading_only` are
+    as for `fit_together`.
     """
-    if begun is not None:
+    if isinstance(begun, Course):
         return OutputFit(fits=(chosen_of(begun, structures),))
     aligned, output, inputs = question.aligned, question.output, question.inputs
     return fit_together(
@@ -356,6 +372,7 @@ def fit_once(
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
         excluded=excluded or {},
+        led=begun,
         fit_drift=fit_drift,
         leading_only=leading_only,
     )

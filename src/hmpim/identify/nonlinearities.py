@@ -8,7 +8,7 @@ import numpy as np
 from hmpim.identify.added_row import add_row, add_row_of_leading, fit_with_row
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit
+from hmpim.identify.fits import fit, lead
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
@@ -29,11 +29,11 @@ def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, 
 
     The levels found are returned with the fit.
     """
-    if len(question.aligned.inputs) > 1 and _may_bend(question):
-        bent = fit_with_row(question, seen)
-        if bent is not None:
-            return seen, bent
-    return fit(question, seen)
+    if len(question.aligned.inputs) == 1 or not _may_bend(question):
+        return fit(question, seen)
+    led = lead(question, seen)
+    bent = fit_with_row(question, seen, *led)
+    return fit(question, seen, led) if bent is None else (seen, bent)
 
 
 def _may_bend(question: Question) -> bool:

@@ -140,31 +140,35 @@ class _Unit:
         self.last = x.size - 1
         rates = rubbing.rates()
         self.speed = np.gradient(x, _STEP)
-        self.thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
-        self.pull = self._pull(rubbing)
-        self.within = _powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS)
-        self.moved = _powers(self.within[_PARTS], _AHEAD)
-        self.shifts, self.speeds = (np.ascontiguousarray(self.moved[:, k]) for k in (0, 1))
+        thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
+        self.pull = self._pull(rubbing, thrust)
+        self.known = np.stack([x, self.speed, thrust, self.pull], axis=1)
+        within = _powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS)
+        moved = _powers(within[_PARTS], _AHEAD)
+        self.within: list[_Real] = list(within)  # a list is indexed faster
+        self.moved: list[_Real] = list(moved)
+        self.shifts, self.speeds = (np.ascontiguousarray(moved[:, k]) for k in (0, 1))
+        self.against = -self.speed  # speed of z - x at which the unit is at rest
         self.fades = np.exp(-_STEP / self.lag) if self.lag else 0.0
         self.unsure = 0  # step up to which more friction would hold the unit
         self.usual = _AHEAD  # steps from one reversal to the next, roughly
         self.effect = np.zeros(x.size)
         self.moves = np.ones(x.size, dtype=bool)
 
-    def _pull(self, rubbing: Rubbing) -> _Real:
+    def _pull(self, rubbing: Rubbing, thrust: _Real) -> _Real:
         """W while the unit sticks, plus its deflection, (m,), once the lag is over."""
         d = rubbing.denominator
         if not self.lag:
-            return np.asarray(self.thrust + d[1] * self.speed + self.x)
-        given = self.x + d[1] * self.speed + (d[2] / rubbing.inertia - 1.0) * self.thrust
+            return np.asarray(thrust + d[1] * self.speed + self.x)
+        given = self.x + d[1] * self.speed + (d[2] / rubbing.inertia - 1.0) * thrust
         keeps = np.exp(-_STEP / self.lag)
         start = np.array([keeps * given[0]])
         late, _ = scipy.signal.lfilter([1.0 - keeps], [1.0, -keeps], given, zi=start)
-        return np.asarray(self.thrust + late)
+        return np.asarray(thrust + late)
 
     def follow(self) -> tuple[_Real, NDArray[np.bool_]]:
         """The effect, and where the unit moves."""
-        state = np.zeros(self.moved.shape[1])
+        state = np.zeros(self.shifts.shape[1])
         if abs(self.speed[0]) <= _AT_REST * float(np.max(np.abs(self.speed))):
             at, state = self._stick(0, 0.0, float(self.x[0]), 0.0, state)
         else:
@@ -177,21 +181,20 @@ class _Unit:
 
     def _slide(self, at: int, state: _Real) -> tuple[int, _Real]:
         """Follow the unit to its next reversal and from there."""
-        forward, begun = state.item(-1) > 0.0, at
+        begun, is_back = at, np.less if state.item(-1) > 0.0 else np.greater
         while True:
             ahead = min(self.usual, self.last - at)
-            speeds = self.speeds[1 : ahead + 1] @ state
-            speeds += self.speed[at + 1 : at + 1 + ahead]
-            back = speeds < 0.0 if forward else speeds > 0.0
+            speeds = self.speeds[1 : ahead + 1].dot(state)
+            back = is_back(speeds, self.against[at + 1 : at + 1 + ahead])
             turn = back.argmax().item()
             found = back.item(turn)
             passed = turn if found else ahead
-            np.matmul(self.shifts[: passed + 1], state, out=self.effect[at : at + passed + 1])
-            state = self.moved[passed] @ state
+            self.shifts[: passed + 1].dot(state, out=self.effect[at : at + passed + 1])
+            state = self.moved[passed].dot(state)
             at += passed
             if found:
                 self.usual = min(max(2 * (at - begun), _FEWEST), _AHEAD)
-                return self._turn(at, state, speeds.item(turn))
+                return self._turn(at, state, speeds.item(turn) + self.speed.item(at + 1))
             if at == self.last:
                 return at, state
             self.usual = min(2 * self.usual, _AHEAD)
@@ -201,17 +204,14 @@ class _Unit:
         now = self.speed.item(at) + state.item(1)
         share = now / (now - beyond) if now * beyond < 0.0 else 0.0
         state = self._later(state, share)
-        x, speed, thrust, pull = (
-            known.item(at) + share * (known.item(at + 1) - known.item(at))
-            for known in (self.x, self.speed, self.thrust, self.pull)
-        )
+        x, speed, thrust, pull = self._between(at, share)
         state[1] = -speed
         z = x + state.item(0)
         w = thrust + state.item(2) if self.lag else pull - z
         if abs(w) <= self.force:
             return self._stick(at + 1, w - (pull - z), z, 1.0 - share, state)
         if abs(w) <= self.most and at + 1 >= self.unsure:
-            self._doubt(at + 1, w - (pull - z), z, 1.0 - share)
+            self._doubt(at + 1, at + 1, w - (pull - z), z, 1.0 - share)
         state[-1] = self.force if w > 0.0 else -self.force
         return at + 1, self._later(state, 1.0 - share)
 
@@ -220,58 +220,61 @@ class _Unit:
     ) -> tuple[int, _Real]:
         """Hold the unit at z until w exceeds the friction; the rest as for `_held`."""
         first = at
-        at, now, before = self._held(first, excess, z, share, self.force)
-        if first >= self.unsure and self.most > self.force:
-            self._doubt(first, excess, z, share)
-        self.effect[first:at] = z - self.x[first:at]
+        at, now, before = self._held(first, first, excess, z, share, self.force)
         self.moves[first:at] = False
+        if first >= self.unsure and self.most > self.force:
+            self._doubt(at, first, excess, z, share)
+        np.subtract(z, self.x[first:at], out=self.effect[first:at])
         if at == self.x.size:
             return at, state
-        passed = 1.0
         if at > first:
             passed = (self.force - abs(before)) / (abs(now) - abs(before))
-        x, speed, thrust = (
-            known.item(at)
-            if passed == 1.0
-            else known.item(at - 1) + passed * (known.item(at) - known.item(at - 1))
-            for known in (self.x, self.speed, self.thrust)
-        )
+            x, speed, thrust, _ = self._between(at - 1, passed)
+        else:
+            passed = 1.0
+            x, speed, thrust, _ = self.known[at].tolist()
         force = self.force if now > 0.0 else -self.force
-        state[:2] = z - x, -speed
-        state[2:-1] = force - thrust
+        state[0], state[1] = z - x, -speed
+        if self.lag:
+            state[2] = force - thrust
         state[-1] = force
         return at, self._later(state, 1.0 - passed)
 
-    def _doubt(self, first: int, excess: float, z: float, share: float) -> None:
-        """Steps for which more friction would hold the unit; the rest as for `_held`."""
-        self.unsure, _, _ = self._held(first, excess, z, share, self.most)
-        self.moves[first : self.unsure] = False
+    def _doubt(self, at: int, first: int, excess: float, z: float, share: float) -> None:
+        """Steps from `at` on for which more friction would hold the unit; the rest as `_held`."""
+        self.unsure, _, _ = self._held(at, first, excess, z, share, self.most)
+        self.moves[at : self.unsure] = False
 
     def _held(
-        self, first: int, excess: float, z: float, share: float, force: float
+        self, at: int, first: int, excess: float, z: float, share: float, force: float
     ) -> tuple[int, float, float]:
-        """Step at which w exceeds a force if the unit is held at z, and w there and before.
+        """Step from `at` on at which w exceeds a force, and w there and before.
 
-        `excess` is w beyond what it tends to, `share` the part of a step that has passed since. The
-        number of steps if it never does.
+        The unit is held at z since `first`, `excess` is w beyond what it tended to then, and
+        `share` the part of a step that had passed. The number of steps if w never exceeds it.
         """
-        at, ahead, before = first, _FEWEST, force
+        ahead, before = _FEWEST, force
         while at < self.x.size:
-            ahead = min(2 * ahead, self.x.size - at)
             w = self.pull[at : at + ahead] - z
             if excess:
-                w += excess * self.fades ** (at - first + share + np.arange(ahead))
+                w += excess * self.fades ** (at - first + share + np.arange(w.size))
             beyond = np.abs(w) > force
             k = beyond.argmax().item()
             if beyond.item(k):
                 return at + k, w.item(k), w.item(k - 1) if k else before
-            at += ahead
-            before = w.item(-1)
+            at += w.size
+            ahead, before = 2 * ahead, w.item(-1)
         return at, 0.0, before
+
+    def _between(self, at: int, share: float) -> list[float]:
+        """The linear part's position, speed and thrust, and the pull, a share of a step later."""
+        now, then = self.known[at : at + 2].tolist()
+        return [a + share * (b - a) for a, b in zip(now, then, strict=True)]
 
     def _later(self, state: _Real, share: float) -> _Real:
         """The state after a share of a step."""
-        return np.asarray(self.within[round(share * _PARTS)] @ state)
+        later: _Real = self.within[round(share * _PARTS)].dot(state)
+        return later
 
 
 def _powers(step: _Real, most: int) -> _Real:

@@ -28,7 +28,7 @@ from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
 from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
-from hmpim.identify.fitting.course import bridged
+from hmpim.identify.fitting.course import Course, bridged
 from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
@@ -43,7 +43,10 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["OutputFit", "fit_in_motion", "fit_leading", "fit_together"]
+__all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together"]
+
+Led = tuple[int, JointFit]
+"""The input that an output follows most, and its plain fit, as `fit_leading` returns them."""
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -65,6 +68,7 @@ class OutputFit:
     gaining: GainChange | None = None  # a gain that changes, with one input only
     bending: Modelled | None = None  # a nonlinearity that the model includes
     bent: int = 0  # the input whose response has it
+    begun: Course | None = None  # plain fits of the only input with a constant bias, if kept
 
     @property
     def prediction(self) -> Real:
@@ -115,6 +119,7 @@ def fit_together(
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
     excluded: Mapping[int, JointFit],
+    led: Led | None = None,
     fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
     leading_only: bool = False,
 ) -> OutputFit:
@@ -125,6 +130,7 @@ def fit_together(
     inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
     coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
     enter linearly, such as a drift's. Inputs `excluded` are left out; each has its unrelated fit.
+    `led` is the plain fit of the leading input to these samples, if it is known.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the leading input and its plain fit, and its value is
@@ -138,7 +144,9 @@ def fit_together(
     coupled = tuple(name for name in structures if name in COUPLED) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
-    _lead(inputs, pairs, plainly)
+    i, leading = led or _lead(inputs, pairs, plainly)
+    pairs.put(i, leading)
+    pairs.strong.append(i)
     _join(inputs, pairs, plainly)
     if leading_only:
         pairs.refine(pairs.kept, None)
@@ -147,11 +155,26 @@ def fit_together(
         drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
         if drifting is not None:
             return drifting
+    richly = partial(fitted, structures=structures, shared=True)
+    _fit_in_turns(inputs, pairs, plainly, richly, coupled)
+    if pairs.demote():
+        _fit_couplings(inputs, pairs, coupled)
+    return _moved_at_once(pairs)
+
+
+def _fit_in_turns(
+    inputs: list[Real],
+    pairs: Pairs,
+    plainly: Callable[..., JointFit],
+    richly: Callable[..., JointFit],
+    coupled: tuple[StructureName, ...],
+) -> None:
+    """Fit the strong inputs and the couplings, in place, until moving all at once gains little."""
     least = pairs.cost
     _fit_couplings(inputs, pairs, coupled)
     for _ in range(_TURNS):
         before = pairs.structures
-        _fit_strong(inputs, pairs, partial(fitted, structures=structures, shared=True))
+        _fit_strong(inputs, pairs, richly)
         cost = pairs.cost
         pairs.refine(pairs.kept, None)
         clearer = pairs.cost * TWICE < least
@@ -164,18 +187,14 @@ def fit_together(
             pairs.refine(pairs.kept, None)
         if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others
-    if pairs.demote():
-        _fit_couplings(inputs, pairs, coupled)
-    return _moved_at_once(pairs)
 
 
 def fit_leading(
     inputs: list[Real], y: Real, *, valid: Mask | None, fitted: Callable[..., JointFit]
-) -> tuple[int, JointFit]:
-    """Fit the input that an output, (n,), follows most, and its place; others count as noise."""
+) -> Led:
+    """Fit the input that an output, (n,), follows most; the others count as noise."""
     pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=(), excluded={})
-    _lead(inputs, pairs, fitted)
-    return pairs.strong[0], pairs.fits[pairs.strong[0]]
+    return _lead(inputs, pairs, fitted)
 
 
 def fit_in_motion(
@@ -254,16 +273,15 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
 
 
-def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit the input that the output follows most, in place."""
+def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> Led:
+    """Fit the input that the output follows most."""
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
     likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once only
     tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
     i = min(tried, key=lambda j: tried[j].best.fit.cost)
-    pairs.put(i, tried[i])
-    pairs.strong.append(i)
+    return i, tried[i]
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:

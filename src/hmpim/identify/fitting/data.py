@@ -167,11 +167,12 @@ def refit_all(data: Data, fitted: Fits, seen: Counted, *, hopeful: float = np.in
     """
     leading = min(range(len(fitted)), key=lambda i: fitted[i][1].objective)
     by_size = sorted(range(len(fitted)), key=lambda i: fitted[i][1].structure.parameters)
+    problems = {mode: data.problem(mode, seen) for mode in dict.fromkeys(m for m, _ in fitted)}
     done: dict[int, Fit] = {}
     for i in dict.fromkeys([leading, *by_size]):
         mode, fit = fitted[i]
         done[i] = fit_structure(
-            data.problem(mode, seen),
+            problems[mode],
             fit.structure,
             fit.theta,
             iterations=RETURNS if fit.objective < hopeful else 0,

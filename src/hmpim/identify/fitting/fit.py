@@ -21,6 +21,7 @@ from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly
 from hmpim.identify.fitting.rows import Part, Problem, spans
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
+from hmpim.identify.kept import recent
 from hmpim.identify.noise.whiteness import effective_share, is_steady, is_white
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of, numerator_of
 from hmpim.model.response import slowest_time_constant
@@ -151,6 +152,17 @@ class _Known:
         self.cross = self.fixed @ self.target
 
 
+def _known(problem: Problem) -> _Known:
+    """These quantities; those of whitened data are kept for the next fits to the same data."""
+    made = recent(_known, problem.y.nbytes) if problem.filtered else None
+    if made is None:
+        return _Known(problem)
+    if problem not in made:
+        made[problem] = _Known(problem)
+    known: _Known = made[problem]
+    return known
+
+
 class _Evaluation:
     """All inputs at given parameters: linear parameters, residual, and derivatives on demand."""
 
@@ -275,7 +287,7 @@ def evaluating(
     problems, structures
         As for `fit_together`.
     """
-    known = _Known(first)
+    known = _known(first)
 
     def evaluated(thetas: Sequence[Real]) -> Evaluation:
         parts = [part_of(p, s, t) for p, s, t in zip(problems, structures, thetas, strict=True)]
