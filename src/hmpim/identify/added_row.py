@@ -12,7 +12,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import counted_in, fit, started
+from hmpim.identify.fits import counted_in, fit, fit_once, started
 from hmpim.identify.fitting.course import Course, completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -125,15 +125,24 @@ def _with_all(
 ) -> OutputFit | None:
     """Fit all inputs to the output without the effect of a row, which is then computed again.
 
-    None unless that leaves noise, and is likelier than the fit without the row, `former`.
+    Again with that row, if its size has changed; with a drift and hum, if it leaves no noise
+    without them. None unless that leaves noise, and is likelier than the fit without the row,
+    `former`.
     """
-    _, one, beside, _ = found
-    straight, trend = _counting(question, one), beside.best.fit.nuisance[-1] * one.row
-    output = replace(straight.output, values=straight.output.values - trend)
-    _, again = fit(replace(straight, output=output), seen)
-    if not again.fits[i].related:
-        return None
-    joined, row = _joined(again, i, one, trend)
+    _, row, joined, _ = found
+    for steadily in (True, True, False):
+        one, size = row, joined.best.fit.nuisance[-1]
+        trend = size * one.row
+        straight = _counting(question, one)
+        output = replace(straight.output, values=straight.output.values - trend)
+        without = replace(straight, output=output)
+        again = fit_once(without, seen, without.structures) if steadily else fit(without, seen)[1]
+        if not again.fits[i].related:
+            return None
+        joined, row = _joined(again, i, one, trend)
+        settled = abs(joined.best.fit.nuisance[-1] - size) < FEW * abs(size)
+        if settled and leaves_noise(joined, row, seen.rounding):
+            break
     rows = joined.problem.fixed().shape[0] - former.problem.fixed().shape[0]
     gain = criterion_gain(joined, rows, former.best.fit, former.problem)
     if gain <= 2 * CLEARLY or not leaves_noise(joined, row, seen.rounding):

@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real, averaged
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM, searched
 from hmpim.identify.fitting.candidates import in_best_sample, nested
 from hmpim.identify.fitting.course import bridged
 from hmpim.identify.fitting.enrich import PLAIN
@@ -25,6 +25,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.worth import FEW
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.sampled import delayed_response
@@ -123,23 +124,27 @@ def coupling_fit(
     y = bridged(problem.y, problem.valid)
     # Both are whitened: their ratio stays, and noise at low frequencies hides no delay.
     plain = replace(problem, valid=None)
-    rough = rough_response(
-        plain.masked(u), plain.masked(y), longest_delay=int(problem.longest_delay)
-    )
+    longest, moves, answer = int(problem.longest_delay), plain.masked(u), plain.masked(y)
+    rough = rough_response(moves, answer, longest_delay=longest)
     fits: list[Fit] = []
     tried = tuple(name for name in structures if name in COUPLED) or COUPLED
     if not np.any(rough.response):  # nothing that could show a pole
         tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
-        structure = STRUCTURES[name]
-        if structure.order > 1 and fits and not _hopeful(problem, fits):
+        structure, seen = STRUCTURES[name], rough
+        if structure.dc_zeros:  # it is a plain one of the input's acceleration
+            faster = np.gradient(np.gradient(moves))
+            if not _follows(faster, answer, longest):
+                continue
+            seen = rough_response(faster, answer, longest_delay=longest)
+        elif structure.order > 1 and fits and not _hopeful(problem, fits):
             continue
-        seen = _integrated(rough, structure.dc_zeros)
         starts = starting_values(seen, structure, count=2, thorough=True)
         if structure.order == 2:
             simpler = [fit for fit in fits if fit.structure.name == "first_order"]
             starts += [nested(fit) for fit in simpler if not structure.dc_zeros]
-            starts += _resonances(seen, fits[0].delay if fits else float(rough.lag))
+            simple = bool(fits) and not structure.dc_zeros
+            starts += _resonances(seen, fits[0].delay if simple else float(seen.lag))
         found = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
         best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
@@ -161,13 +166,11 @@ def coupling_fit(
     )
 
 
-def _integrated(rough: RoughResponse, times: int) -> RoughResponse:
-    """The rough response to the input's derivative: that of a structure without its DC zeros."""
-    if not times:
-        return rough
-    turn = (1j * rough.omega) ** times
-    weight = rough.weight * np.abs(turn) ** 2
-    return replace(rough, response=rough.response / turn, weight=weight / weight.max())
+def _follows(u: Real, y: Real, longest: int) -> bool:
+    """Whether an output correlates with an input, (n,), at a lag up to `longest`, beyond chance."""
+    power = float(np.var(u) * np.var(y)) * u.size**2
+    share = likeness(u, y, longest).there ** 2 / power if power else 0.0
+    return bool(-0.5 * u.size * np.log1p(-share) > searched(longest + 1))
 
 
 def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
