@@ -123,26 +123,27 @@ def _likeliest_of(found: Iterator[_Found]) -> _Found | None:
 def _with_all(
     question: Question, seen: Imperfections, i: int, found: _Found, former: JointFit
 ) -> OutputFit | None:
-    """Fit all inputs to the output without the effect of a row, which is then computed again.
+    """Fit all inputs next to a row of one, `found` with that input alone.
 
-    Again with that row, if its size has changed; with a drift and hum, if it leaves no noise
-    without them. None unless that leaves noise, and is likelier than the fit without the row,
+    Twice if the size of the row changes by more than 5 %, and with a drift and hum if the residual
+    is then not noise. None unless that leaves noise, and is likelier than the fit without the row,
     `former`.
     """
-    _, row, joined, _ = found
-    for steadily in (True, True, False):
-        one, size = row, joined.best.fit.nuisance[-1]
-        trend = size * one.row
-        straight = _counting(question, one)
-        output = replace(straight.output, values=straight.output.values - trend)
-        without = replace(straight, output=output)
-        again = fit_once(without, seen, without.structures) if steadily else fit(without, seen)[1]
-        if not again.fits[i].related:
-            return None
-        joined, row = _joined(again, i, one, trend)
-        settled = abs(joined.best.fit.nuisance[-1] - size) < FEW * abs(size)
-        if settled and leaves_noise(joined, row, seen.rounding):
+    _, row, beside, _ = found
+    size, all_of_them = float(beside.best.fit.nuisance[-1]), None
+    for _ in range(2):
+        all_of_them = _fit_beside(question, seen, i, row, size, steadily=True)
+        if all_of_them is None:
             break
+        again, joined, row = all_of_them
+        before, size = size, float(joined.best.fit.nuisance[-1])
+        if abs(size - before) < FEW * abs(before):
+            break
+    if all_of_them is None or not leaves_noise(joined, row, seen.rounding):
+        all_of_them = _fit_beside(question, seen, i, row, size, steadily=False)
+        if all_of_them is None:
+            return None
+        again, joined, row = all_of_them
     rows = joined.problem.fixed().shape[0] - former.problem.fixed().shape[0]
     gain = criterion_gain(joined, rows, former.best.fit, former.problem)
     if gain <= 2 * CLEARLY or not leaves_noise(joined, row, seen.rounding):
@@ -151,6 +152,26 @@ def _with_all(
     fits, covariances = list(again.fits), list(again.covariances)
     fits[i], covariances[i] = without_rows(joined, slice(-1, None)), own
     return replace(again, fits=tuple(fits), covariances=tuple(covariances), bending=bending, bent=i)
+
+
+def _fit_beside(
+    question: Question,
+    seen: Imperfections,
+    i: int,
+    one: Nonlinearity,
+    size: float,
+    *,
+    steadily: bool,
+) -> tuple[OutputFit, JointFit, Nonlinearity] | None:
+    """Fit all inputs to the output without a row of a size, and compute the row again from that.
+
+    Without a drift and hum, if `steadily`. None if the output then does not follow input `i`.
+    """
+    trend, straight = size * one.row, _counting(question, one)
+    output = replace(straight.output, values=straight.output.values - trend)
+    without = replace(straight, output=output)
+    again = fit_once(without, seen, without.structures) if steadily else fit(without, seen)[1]
+    return (again, *_joined(again, i, one, trend)) if again.fits[i].related else None
 
 
 def _moved_by_others(fitted: OutputFit, i: int) -> Real:
@@ -200,8 +221,8 @@ def _with_rows(
     """Fit each kind's row; the fit without it is also without a drift that the row replaces.
 
     `others`, (n,), is what other inputs move the output by; the output of `question` is without it.
-    Once a kind leaves noise, one whose row leaves more than twice as much is given up: no dynamics
-    would make up for that.
+    Once a kind leaves noise, another is given up if its row leaves more than twice that power,
+    which better dynamics would not recover.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     if question.exact or is_explained(joint):

@@ -1,8 +1,9 @@
 """Structures of dynamics: which rational functions of s a fit may try.
 
 Every structure is ``B(s) / A(s)`` with B(0) = A(0) = 1 after the scale factor is taken out;
-an integrator has s A(s) below instead. A(s) is a product of sections ``1 + c1 s`` and
-``1 + c1 s + c2 s²`` with positive coefficients, so that every model tried is stable.
+with zeros at DC, s or s² times such a B. An integrator has s A(s) below instead. A(s) is a
+product of sections ``1 + c1 s`` and ``1 + c1 s + c2 s²`` with positive coefficients, so that every
+model tried is stable.
 
 Of many modes B(s) is no list of powers of s, whose responses are then too much alike to be told
 apart, but a sum: each mode's gain over its own section, ``g1 / A1(s) + g2 / A2(s) + …``.

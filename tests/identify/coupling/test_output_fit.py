@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import RecordError
+from hmpim.identify.coupling.weak import whitening_of
 
 FS = 200.0
 TIME = np.arange(2000) / FS
@@ -237,3 +238,54 @@ def test_a_product_of_inertia_leaves_the_noise_white(size, seed, structures):
     assert {found["y0", "u1"].structure, found["y1", "u0"].structure} & (
         structures - {"second_order"}
     )
+
+
+@pytest.mark.parametrize("small", [1.0, 1e-5])
+def test_noise_is_that_without_what_follows_the_inputs_in_any_unit(small):
+    rng = np.random.default_rng(0)
+    u, v = lfilter([1.0], [1.0, -0.8], rng.standard_normal((2, 4000)))
+    rest = 0.3 * lfilter([1.0], [1.0, -0.5], rng.standard_normal(4000))
+    alone = whitening_of(rest)
+    gain = whitening_of(rest + u - 2.0 * v, (u, small * v))
+    assert np.median(gain / alone) == pytest.approx(1.0, abs=0.02)
+    assert np.percentile(np.abs(gain / alone - 1.0), 95) < 0.25
+
+
+def test_of_more_inputs_than_a_window_separates_all_counts_as_noise():
+    rng = np.random.default_rng(0)
+    inputs = list(rng.standard_normal((12, 1000)))
+    rest = np.cumsum(rng.standard_normal(1000))
+    gain = whitening_of(rest, inputs)
+    assert gain[0] == pytest.approx(whitening_of(rest)[0], rel=0.5)
+    assert np.all(np.isfinite(gain))
+
+
+def test_identical_inputs_are_one():
+    rng = np.random.default_rng(0)
+    u, rest = rng.standard_normal(2000), np.cumsum(rng.standard_normal(2000))
+    one, two = whitening_of(rest + 50.0 * u, (u,)), whitening_of(rest + 50.0 * u, (u, u))
+    assert two == pytest.approx(one, rel=0.1)
+
+
+def test_a_high_pass_alone_may_be_stated_for_inputs_that_do_not_follow():
+    rng = np.random.default_rng(2)
+    y = hmpim.simulate(
+        hmpim.Model(
+            delay=0.02,
+            scale_factor=1e-3,
+            numerator=(1.0, 0.0, 0.0),
+            denominator=(1e-3, 0.04, 1.0),
+        ),
+        INPUTS[0],
+        fs=FS,
+        intersample="bandlimited",
+    )
+    record = hmpim.Record.from_arrays(
+        {"u0": INPUTS[0], "u1": INPUTS[1]},
+        {"y": y + 0.001 * rng.standard_normal(y.size)},
+        fs=FS,
+        intersample="bandlimited",
+    )
+    found = hmpim.identify(record, structures=["second_order_high_pass"])
+    assert found["y", "u0"].structure == "second_order_high_pass"
+    assert found["y", "u1"].parameters.scale_factor is None

@@ -79,11 +79,12 @@ def test_a_lead_lag_behind_a_converter_is_found(late):
         assert figure.ci95[0] <= value <= figure.ci95[1], name
 
 
-def test_a_high_pass_behind_a_converter_has_a_known_fraction_of_a_sample():
+@pytest.mark.parametrize("delay", [0.0123, 0.0, 0.01])
+def test_a_high_pass_behind_a_converter_has_a_known_fraction_of_a_sample(delay):
     """One gain cannot imitate it, as the three coefficients of a lead-lag can."""
     natural = 2 * np.pi * 4.0
     model = hmpim.Model(
-        delay=0.0123,
+        delay=delay,
         scale_factor=2.0 / natural**2,
         numerator=(1.0, 0.0, 0.0),
         denominator=(1.0 / natural**2, 1.2 / natural, 1.0),
@@ -95,7 +96,7 @@ def test_a_high_pass_behind_a_converter_has_a_known_fraction_of_a_sample():
     assert (pair.structure, pair.verdict) == ("second_order_high_pass", "ok")
     assert pair.scale_factor.unit == "s^2"
     assert pair.delay.std < 1e-4
-    truth = {"delay": 0.0123, "scale_factor": 2.0 / natural**2}
+    truth = {"delay": delay, "scale_factor": 2.0 / natural**2}
     for name, value in truth.items():
         figure = getattr(pair, name)
         assert abs(figure.value - value) < 4.0 * figure.std, name

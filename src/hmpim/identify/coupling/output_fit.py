@@ -297,8 +297,8 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
         own = pairs.fits.get(i)
-        if own is not None and own.related and _power(own) < _power(tried[i]):
-            continue  # it is described better as a weak one
+        if own is not None and own.related and _mean_square(own) < _mean_square(tried[i]):
+            continue  # its fit as a coupling leaves less
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -351,7 +351,7 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     return [j for j, one in share.items() if one >= NEARLY * most]
 
 
-def _power(fit: JointFit) -> float:
+def _mean_square(fit: JointFit) -> float:
     """Mean square of a fit's residual."""
     return fit.best.fit.cost / fit.problem.counted
 
@@ -403,10 +403,10 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
         return
     latest = max(PART * pairs.y.size, 4.0 * best.best.fit.delay) + 2.0
     rest = pairs.residual()
-    # Couplings pass through the axis that the strongest input drives.
-    driven = likeness(inputs[pairs.strong[0]], contribution(best), pairs.y.size // 2 - 1)
+    # A coupling answers about as late as the axis of the strongest input.
+    late = likeness(inputs[pairs.strong[0]], contribution(best), pairs.y.size // 2 - 1).lag
     others = [inputs[j] for j in weak]
-    whitening = whitening_of(rest, others, late=driven.lag)
+    whitening = whitening_of(rest, others, late=late)
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
@@ -427,4 +427,4 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
         while pairs.together(whitening, drop=names is structures):
             pass
         rest = pairs.residual()
-        whitening = whitening_of(rest, others, late=driven.lag)
+        whitening = whitening_of(rest, others, late=late)

@@ -3,7 +3,7 @@
 The residual of an axis is seldom white: friction, drift and the tails of resonances are at low
 frequencies, and a plain sum of squares would fit couplings to them. Here the residual's own
 spectrum weights the sum of squares (generalised least squares: Söderström and Stoica, System
-Identification, 1989, ch. 4). Only plain structures are tried, and a second-order high pass: a
+Identification, 1989, ch. 4). Only plain structures and a second-order high pass are tried: a
 product of inertia turns one axis's acceleration into another's disturbance, which a servo rejects
 at DC. The one with the smallest criterion of H. Akaike (IEEE Trans. Autom. Control 19, 1974) is
 chosen: it keeps a barely significant pole, and so the wider error bars.
@@ -43,13 +43,14 @@ _NARROWEST = 10
 """Least half-width of that average, in bins."""
 
 _FLOOR = 1e-8
-"""Smallest power of the noise, relative to its mean."""
+"""Smallest power of the noise, relative to the mean power of the residual."""
 
 _PARTS = 4
 """Parts of a window on either side of its middle."""
 
 _ALIKE = 1e-6
-"""Least share of the greatest power at which an input, or a difference of two, is seen."""
+"""Power, over the strongest in the window, below which an input, or what distinguishes two alike,
+is left out."""
 
 _TASTE = 4
 _STEPS = 25
@@ -63,8 +64,8 @@ def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0
     """Gain at each bin that whitens a residual, (n // 2 + 1,); None if it is white already.
 
     The inverse root of its periodogram, averaged over a tenth of the frequency on either side. The
-    residual, (n,), is 0 where a sample does not count; whitened, it has unit variance. What follows
-    any of the `inputs`, each (n,), `late` by about so many samples, is no noise: it is left out.
+    residual, (n,), is 0 where a sample does not count. Whitened, the noise in it has unit variance;
+    what follows any of the `inputs`, (n,), at a delay of about `late` samples, is not noise.
 
     Examples
     --------
@@ -85,17 +86,19 @@ def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0
 
 
 def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[np.int64]) -> Real:
-    """Power of a residual at each bin, (m,), without its regression on inputs around it.
+    """Power at each bin, (m,), of what a local regression on the inputs leaves of a residual.
 
-    One complex gain for each input and window (local rational methods of degree 0: Pintelon and
-    Schoukens, System Identification, 2nd ed., Wiley 2012, ch. 7). The delay changes little over a
-    window once the inputs are moved by it.
+    One complex gain for each input and window (local methods of degree 0: Pintelon and Schoukens,
+    System Identification, 2nd ed., Wiley 2012, ch. 7). The inputs are first delayed by `late`, so
+    that the phase changes little within a window. Where a window has too few bins for that, all
+    of the residual counts as noise.
     """
     edges = [1]
     while edges[-1] < reach.size:
         edges.append(min(edges[-1] + max(int(reach[edges[-1]]) // _PARTS, 1), reach.size))
     turn = np.exp(-2j * np.pi * late / residual.size * np.arange(reach.size))
-    moved = [scipy.fft.rfft(u - u.mean()) * turn for u in inputs]
+    spectra = [scipy.fft.rfft(u - u.mean()) * turn for u in inputs]
+    moved = [one / max(float(np.linalg.norm(one)), 1e-300) for one in spectra]
     answer = scipy.fft.rfft(residual - residual.mean())
     window = np.ones(2 * _PARTS + 1)  # parts, as differences of running sums would cancel
 
@@ -106,9 +109,10 @@ def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[n
     gram = np.array([[around(u, v) for v in moved] for u in moved]).transpose(2, 0, 1)
     cross = np.array([around(u, answer) for u in moved]).T
     gains = np.einsum("kij,kj->ki", np.linalg.pinv(gram, rcond=_ALIKE, hermitian=True), cross)
-    rest = around(answer, answer).real - np.einsum("ki,ki->k", cross.conj(), gains).real
-    freedom = np.convolve(np.diff(edges), window, "same") - len(moved)
-    power = rest / np.maximum(freedom, 1.0) / residual.size
+    count, whole = np.convolve(np.diff(edges), window, "same"), around(answer, answer).real
+    rest = whole - np.einsum("ki,ki->k", cross.conj(), gains).real
+    many = count > 2 * len(moved)
+    power = np.where(many, rest, whole) / (count - many * len(moved)) / residual.size
     centres = 0.5 * (np.array(edges[:-1]) + np.array(edges[1:]) - 1.0)
     return np.asarray(np.interp(np.arange(reach.size), centres, power))
 
@@ -116,7 +120,7 @@ def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[n
 def coupling_fit(
     problem: Problem, u: Real, *, intersample: Intersample, structures: tuple[StructureName, ...]
 ) -> JointFit:
-    """Fit the plain structures to the output without the contributions of stronger inputs.
+    """Fit the structures of a coupling to the output without the contributions of stronger inputs.
 
     The criteria use the problem's whitening; the problem that is returned is without it. The input
     has shape (n,), with its behaviour between samples as for the strongest input.
@@ -132,9 +136,9 @@ def coupling_fit(
         tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
         structure, seen = STRUCTURES[name], rough
-        if structure.dc_zeros:  # it is a plain one of the input's acceleration
+        if structure.dc_zeros:  # a plain second order, driven by the input's acceleration
             faster = np.gradient(np.gradient(moves))
-            if not _follows(faster, answer, longest):
+            if fits and not _correlates(faster, answer, longest):
                 continue
             seen = rough_response(faster, answer, longest_delay=longest)
         elif structure.order > 1 and fits and not _hopeful(problem, fits):
@@ -143,8 +147,8 @@ def coupling_fit(
         if structure.order == 2:
             simpler = [fit for fit in fits if fit.structure.name == "first_order"]
             starts += [nested(fit) for fit in simpler if not structure.dc_zeros]
-            simple = bool(fits) and not structure.dc_zeros
-            starts += _resonances(seen, fits[0].delay if simple else float(seen.lag))
+            lag = fits[0].delay if fits and not structure.dc_zeros else float(seen.lag)
+            starts += _resonances(seen, lag)
         found = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
         best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
@@ -166,11 +170,12 @@ def coupling_fit(
     )
 
 
-def _follows(u: Real, y: Real, longest: int) -> bool:
-    """Whether an output correlates with an input, (n,), at a lag up to `longest`, beyond chance."""
+def _correlates(u: Real, y: Real, longest: int) -> bool:
+    """Whether a whitened output correlates with an input at any lag up to `longest`."""
     power = float(np.var(u) * np.var(y)) * u.size**2
     share = likeness(u, y, longest).there ** 2 / power if power else 0.0
-    return bool(-0.5 * u.size * np.log1p(-share) > searched(longest + 1))
+    gain = -0.5 * u.size * np.log1p(-min(share, 1.0 - 1e-12))
+    return bool(gain > searched(longest + 1))
 
 
 def _hopeful(problem: Problem, fits: list[Fit]) -> bool:
@@ -201,9 +206,9 @@ def unsettled(fit: JointFit) -> tuple[float, float]:
     """
     if fit.best.fit.structure.dc_zeros:  # no other has a scale factor of its kind
         return 0.0, 0.0
-    steady = [t for t in fit.trials if not t.fit.structure.dc_zeros]
-    richer = [t for t in steady if t.fit.structure.order > 1]
-    plainer = [t for t in steady if t.fit.structure.order < 2]
+    alike = [t for t in fit.trials if not t.fit.structure.dc_zeros]
+    richer = [t for t in alike if t.fit.structure.order > 1]
+    plainer = [t for t in alike if t.fit.structure.order < 2]
     if not richer or not plainer:
         return 0.0, 0.0
     rich = min(richer, key=lambda t: t.criterion)

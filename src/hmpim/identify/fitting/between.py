@@ -1,4 +1,4 @@
-"""Refits under each assumption between the samples, from where fits under another ended."""
+"""Fits under each assumption between the samples, from where fits under another ended."""
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def fit_under_each_assumption(
 
     Poles and zeros of a rich structure may have made up for a wrong assumption. So plainer
     structures are fitted under the other assumptions if they may be about as likely, and so are
-    members of `structures` without the poles and zeros that the leading fits need no more.
+    members of `structures` that lack poles and zeros which the leading fits do not need.
     """
     fitted = [(natural, fit) for fit in fits]
     if alone:

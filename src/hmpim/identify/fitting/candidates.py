@@ -299,7 +299,7 @@ def pruned(problem: Problem, fits: list[Fit], structures: tuple[StructureName, .
         simplest = min(above, key=lambda f: (f.structure.parameters, f.objective))
         start = without_fast(simplest, structure)
         starts = [] if start is None else [start]
-        if structure.dc_zeros > 1:  # the slowest poles may be any of many
+        if structure.dc_zeros > 1:  # the slowest poles of a rich fit need not be its own
             starts += _grown(structure, every)
         hopeless = TWICE * least
         for start in starts:
@@ -326,9 +326,9 @@ def _holds(fit: Fit, plain: Structure) -> bool:
 
 
 def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
-    """Starts from fits with one pole fewer."""
+    """Starts from fits with one pole fewer, or of a high pass from first-order fits with a zero."""
     if structure.dc_zeros > 1:
-        return [start for fit in fits for start in _high_passes(fit)]
+        return [start for fit in fits if (start := _as_high_pass(fit)) is not None]
     return [
         with_pole(fit.structure, fit.theta, _PARTNER * scale_of(fit))
         for fit in fits
@@ -336,19 +336,17 @@ def _grown(structure: Structure, fits: list[Fit]) -> list[Real]:
     ]
 
 
-def _high_passes(fit: Fit) -> list[Real]:
-    """Start of a second-order high pass that departs from a constant as a first-order fit does.
+def _as_high_pass(fit: Fit) -> Real | None:
+    """Start of a second-order high pass from a first-order fit with a zero; None if it has none.
 
-    At high frequencies, 1 - 1/(Ts) describes either. The rough response hardly shows a corner near
-    the end of the band, where it leaks.
+    At high frequencies both are about 1 - r/s, which gives r. The rough response hardly shows a
+    corner near the end of the band, where it leaks.
     """
     if fit.structure.order != 1 or fit.structure.zeros != 1:
-        return []
+        return None
     below, above = fit.denominator, fit.numerator
     rate = 1.0 / below[1] - (above[0] / above[1] if above[1] else np.inf)
-    if not rate > 0.0:
-        return []
-    return [np.array([fit.delay, np.log(2.0 / rate), 0.5])]
+    return np.array([fit.delay, np.log(2.0 / rate), 0.5]) if rate > 0.0 else None
 
 
 def best_of(
@@ -393,7 +391,10 @@ def best_of(
 
 
 def in_best_sample(problem: Problem, best: Fit) -> Fit:
-    """Move the delay one sample earlier or later while that improves a fit kept in its sample."""
+    """Move the delay one sample earlier or later while that improves the fit.
+
+    Only where the delay is confined to one sample.
+    """
     if not steps_through(best.structure, held=problem.source.degree == 0):
         return best
     for step in (-1.0, 1.0):

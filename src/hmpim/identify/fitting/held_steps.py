@@ -3,9 +3,9 @@
 If the numerator has the denominator's degree, the output jumps with a held input. Samples then do
 not distinguish a fraction of a sample of delay from a change of the numerator, and the likelihood
 jumps from one whole sample to the next. So the delay stays in the middle of its sample, the
-neighbouring samples are tried one by one, and figures are read at both ends of the best one. Only
-where the structure leaves the numerator fewer coefficients than there are poles, as in a
-second-order high pass, the fraction remains distinguishable, and the delay moves in its sample.
+neighbouring samples are tried one by one, and figures are read at both ends of the best one. Where
+a structure has fewer numerator coefficients than poles, as a second-order high pass has, samples do
+determine the fraction, and the delay moves within its sample.
 """
 
 from dataclasses import replace
@@ -23,7 +23,8 @@ _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
 
 _INSIDE = 1e-6
-"""The same for a delay that moves in its sample: the likelihood jumps at the ends."""
+"""Least distance from the ends for a delay that moves within its sample: the likelihood jumps
+there."""
 
 _FORGOTTEN = 1e-10
 """Share of a state that remains after part of a sample, below which it is unobservable."""
@@ -69,7 +70,7 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
     Parameters
     ----------
     structure : Structure
-        One for which `steps_through` is true.
+        One for which `in_whole_samples` is true, with poles.
     theta : ndarray, shape (1 + order,)
         Delay in samples, parameters of the sections.
     linear : ndarray, shape (m + 1,)

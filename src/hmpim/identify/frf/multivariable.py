@@ -38,7 +38,7 @@ from hmpim.identify.frf.rational import (
     solved,
 )
 from hmpim.identify.signals import bins_in, check_band
-from hmpim.identify.worth import MATERIAL, PART
+from hmpim.identify.worth import PART
 
 __all__ = ["ResponseMatrix", "response_matrix"]
 
@@ -50,6 +50,10 @@ _RATIO = 1.6
 _STEPS = 3
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
+# Condition number up to which inputs count as separated: the worst combination then has ten times
+# the error of the best.
+_WORST = 10.0
+
 # Fewest valid samples of an output.
 _FEWEST = 16
 
@@ -99,8 +103,8 @@ def response_matrix(
     The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The
     outputs, (p, n), follow them by delays in s, (p, 1) or (), not negative; rough values suffice.
     Where an output is not `valid`, (n,) or (p, n), it is taken from `fill`, (p, n), a model's
-    prediction with the bias. At most `points` frequencies are spaced by a constant ratio. `names`
-    are those of the inputs, then of the outputs, for messages.
+    prediction with the bias; both are given, or neither. At most `points` frequencies are spaced by
+    a constant ratio. `names` are those of the inputs, then of the outputs, for messages.
 
     Raises
     ------
@@ -145,7 +149,7 @@ def response_matrix(
     )
     frequency = centre * step
     condition = np.maximum(_input_condition(moved[0], centre), conditions.max(axis=1))
-    usable = condition <= MATERIAL**-0.5
+    usable = condition <= _WORST
     response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
     # Filled samples have no residual and add no information: both raise the error.
     std = np.sqrt(variance) / share[:, None]

@@ -48,9 +48,10 @@ _FAST = 9
 def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual still follows the input.
 
-    From 3 % of the output on, all figures of the model are in doubt. The noise is from a tenth of
-    the residual's power on; so is then each figure that may move by 1 %: a figure moves at most by
-    its deviation, for white noise, times the root of this part over the noise (Cauchy-Schwarz).
+    If more than 3 % of the output follows, all figures of the model are in doubt. The noise is in
+    doubt if a tenth of the residual's power follows; if a fifth does, so is each figure that this
+    may move by 1 %: a figure moves at most by its deviation, for white noise, times the root of
+    this part over the noise (Cauchy-Schwarz).
     """
     misfit = evidence.misfit
     if misfit.probability >= FALSE_ALARM or misfit.share == 0.0:

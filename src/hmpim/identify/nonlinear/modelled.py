@@ -188,7 +188,7 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
     tried: list[Real] = []
     changes: list[Real] = []
     nearest, least, last, counted = None, PART, np.inf, problem.counted
-    ever: Mask | None = None  # samples that have counted since the fit was last no nearer
+    ever: Mask | None = None  # samples that have counted in every turn since the first restart
     for turn in range(TURNS):
         data = with_row(problem, one)
         if data.counted < _FEWEST:
@@ -201,8 +201,8 @@ def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity |
         if least < MATERIAL:
             break
         many = deviance > last and abs(data.counted - counted) > FEW * counted
-        if many or turn == TURNS // 2:
-            tried.clear()  # many samples that wait come and go, or a few again and again
+        if many or turn == TURNS // 2:  # restart: many samples come and go, or a few ever again
+            tried.clear()
             changes.clear()
             ever = one.counts
         last, counted = deviance, data.counted

@@ -204,6 +204,9 @@ def identify_levels(
         )
     if len(given) < 2:
         raise ArgumentError(f"{len(given)} record has nothing to be compared with; give two")
+    for amplitude in amplitudes or ():
+        if not (np.isfinite(amplitude) and amplitude > 0):
+            raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
     called = names_of(given, names)
     check_channels(given, called)
     linear = partial(identify, nonlinear="reported")
@@ -248,9 +251,6 @@ def compare_levels(
     >>> [finding.code for finding in found.findings], found.linear_up_to
     (['nonlinear', 'hardening'], 1.0)
     """
-    for amplitude in amplitudes:
-        if not (np.isfinite(amplitude) and amplitude > 0):
-            raise ArgumentError(f"amplitude {amplitude!r} is not a positive number")
     levels = sorted(zip(map(float, amplitudes), results, strict=True), key=lambda level: level[0])
     trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
     changed = [

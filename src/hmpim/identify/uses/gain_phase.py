@@ -12,6 +12,7 @@ from hmpim.identify.reading.bandwidth import ratio_at
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.result.error_bars import estimate
 from hmpim.model import Model, RationalDelay, phase, response
+from hmpim.model.dynamics import FILTERS
 from hmpim.model.response import log_slopes
 
 __all__ = ["GainPhase", "gain_and_phase", "measurable"]
@@ -102,23 +103,20 @@ def gain_and_phase(
         fs=fs,
     ).system
     if system.step is not None:
-        system = _as_fitted(system, len(pair.covariance))
+        system = _as_fitted(system, pair)
     return tuple(_at(pair, float(f), system, pair.covariance, fs) for f in places)
 
 
-def _as_fitted(system: RationalDelay, parameters: int) -> RationalDelay:
-    """A filter without the last zeros that only powers of z need, of so many parameters.
+def _as_fitted(system: RationalDelay, pair: PairIdentification) -> RationalDelay:
+    """A filter with as many coefficients as were fitted, of powers of 1 - 1/z.
 
-    They are the delay and the coefficients but the denominator's first, of powers of 1 - 1/z. A
-    fitted coefficient may be zero as well.
+    Numerator and denominator are padded with zeros to equal length, which powers of z need. The
+    covariance is of the delay and of all coefficients but the denominator's first.
     """
-    above, below = system.numerator, system.denominator
-    while above.size + below.size > parameters:
-        ends = [
-            abs(one[-1]) / np.abs(one).max() if one.size > 1 else np.inf for one in (above, below)
-        ]
-        above, below = (above[:-1], below) if ends[0] < ends[1] else (above, below[:-1])
-    return replace(system, numerator=above, denominator=below)
+    order = FILTERS[pair.structure].order if pair.structure in FILTERS else 0  # of an FIR filter
+    above = 0 if pair.covariance is None else len(pair.covariance) - 1 - order
+    below = system.denominator[: 1 + order]
+    return replace(system, numerator=system.numerator[:above], denominator=below)
 
 
 def measurable(frequency: ArrayLike, fs: float) -> Real:

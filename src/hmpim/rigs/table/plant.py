@@ -19,8 +19,7 @@ FloatArray = NDArray[np.float64]
 BASE = 3  # joints of the base, in front of the axes
 _NUDGE = 1e-6  # rad and rad/s
 _STEPS = 4
-"""Steps of the integration in a tick of the controller. Dry friction reverses at a step: with one
-of 0.5 ms, -90° came 0.1 to 0.7 % too low."""
+"""Steps of the integration in a tick of the controller. Dry friction reverses at a step."""
 ORDER = np.array([CHAIN.index(axis) for axis in AXES])
 """Where each of `AXES` stands among MuJoCo's five axis joints."""
 
@@ -153,7 +152,10 @@ class Plant:
         return result[:, ORDER]
 
     def step(self, position: FloatArray) -> Step:
-        """Derivatives of one tick about a point at rest (MuJoCo's `mjd_transitionFD`).
+        """Derivatives of one tick about a point at rest.
+
+        Those of one step of the integration (MuJoCo's `mjd_transitionFD`), composed at a constant
+        demand.
 
         Parameters
         ----------
