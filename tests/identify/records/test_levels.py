@@ -114,5 +114,5 @@ def test_bad_levels_are_refused():
 
 def test_an_impossible_amplitude_is_refused_before_anything_is_identified():
     record = Record.from_arrays({"u": np.arange(60.0)}, {"y": np.arange(60.0)}, fs=1.0)
-    with pytest.raises(ArgumentError, match="amplitude -1.0 is not a positive number"):
+    with pytest.raises(ArgumentError, match=r"amplitude -1\.0 is not a positive number"):
         identify_levels([record, record], amplitudes=[1.0, -1.0])
