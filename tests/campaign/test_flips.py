@@ -103,8 +103,7 @@ def shortened(name, tests):
     ("name", "tests", "most"),
     [
         ("section_v_reduced", ("acceptance", "levels"), 0),
-        # Of elevation's noise: its residual follows azimuth by about the share that is doubted.
-        ("demo", ("together",), 3),
+        ("demo", ("together",), 2),
     ],
 )
 def test_how_many_seeds_turn_a_pair_of_the_table(name, tests, most, tmp_path):

@@ -62,8 +62,8 @@ def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     much = misfit.share > 2 * FEW  # otherwise the noise is off by a few per cent at most
     if large and not much:
         moved = tuple(name for name in MODELLED if name != "noise_std")
-    elif not large:
-        some = much and owed > WORTH and misfit.share > PART
+    elif much and not large:
+        some = owed > WORTH and misfit.share > PART
         moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
     yield Finding(
         code="lack_of_fit",
