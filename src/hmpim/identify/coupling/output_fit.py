@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
@@ -297,8 +297,8 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
         own = pairs.fits.get(i)
-        if own is not None and own.related and _mean_square(own) < _mean_square(tried[i]):
-            continue  # its fit as a coupling leaves less
+        if own is not None and own.related and _leaves_less(own, tried[i]):
+            continue  # it is a coupling
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -351,9 +351,10 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     return [j for j, one in share.items() if one >= NEARLY * most]
 
 
-def _mean_square(fit: JointFit) -> float:
-    """Mean square of a fit's residual."""
-    return fit.best.fit.cost / fit.problem.counted
+def _leaves_less(one: JointFit, other: JointFit) -> bool:
+    """Whether a fit is clearly likelier than another, as its residual is smaller."""
+    (own, few), (rest, many) = ((f.best.fit.cost, f.problem.counted) for f in (one, other))
+    return bool(0.5 * few * np.log(max(rest / many, 1e-300) / max(own / few, 1e-300)) > CLEARLY)
 
 
 def _is_large(fit: JointFit) -> bool:
