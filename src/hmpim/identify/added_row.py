@@ -6,7 +6,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Real, count_alike
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
@@ -139,14 +139,16 @@ def _with_all(
         before, size = size, float(joined.best.fit.nuisance[-1])
         if abs(size - before) < FEW * abs(before):
             break
-    if all_of_them is None or not leaves_noise(joined, row, seen.rounding):
+    noise = all_of_them is not None and leaves_noise(joined, row, seen.rounding)
+    if not noise:
         all_of_them = _fit_beside(question, seen, i, row, size, steadily=False)
         if all_of_them is None:
             return None
         again, joined, row = all_of_them
+        noise = leaves_noise(joined, row, seen.rounding)
     rows = joined.problem.fixed().shape[0] - former.problem.fixed().shape[0]
     gain = criterion_gain(joined, rows, former.best.fit, former.problem)
-    if gain <= 2 * CLEARLY or not leaves_noise(joined, row, seen.rounding):
+    if gain <= 2 * CLEARLY or not noise:
         return None
     bending, own = described(_known_besides(joined, again, i), row, question.aligned.fs)
     fits, covariances = list(again.fits), list(again.covariances)
@@ -250,16 +252,15 @@ def _with_rows(
             one, left = _likeliest(
                 kind, command, problem, begun, leading, joint.problem, count, seen.rounding
             )
-            beside = None
             if one is not None and left < TWICE * least:
                 beside = _fitted_with(steady, seen, problem, one)
-            if one is not None and beside is not None and beside.related:
-                gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
-                yield gain, one, beside, other
-                if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding):
-                    least = min(least, beside.best.fit.cost / beside.problem.counted)
-                if beside.best.fit.is_white:
-                    continue
+                if beside.related:
+                    gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
+                    yield gain, one, beside, other
+                    if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding):
+                        least = min(least, beside.best.fit.cost / beside.problem.counted)
+                    if beside.best.fit.is_white:
+                        continue
             play, friction = ALIKE
             if kind == play:  # the plain fit first
                 kinds[friction] = [*begun, *kinds.pop(friction, [])]
@@ -271,16 +272,9 @@ def _plain(
     """Plain fits of one input, which are `known` if the search began with the same data."""
     if known is not None and rows is None:
         counts, y = counted_in(question, seen), question.output.values
-        if np.array_equal(known.data.y, y) and _count_alike(known.given.valid, counts):
+        if np.array_equal(known.data.y, y) and count_alike(known.given.valid, counts):
             return known
     return completed(turn_ahead(started(question, seen, rows)))
-
-
-def _count_alike(one: Mask | None, other: Mask | None) -> bool:
-    """Whether the same samples count; all if None."""
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other)
 
 
 def _fitted_with(

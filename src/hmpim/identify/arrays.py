@@ -3,7 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Complex", "Mask", "Real", "averaged", "every_of", "median", "summed", "thinned"]
+__all__ = [
+    "Complex",
+    "Mask",
+    "Real",
+    "averaged",
+    "count_alike",
+    "every_of",
+    "median",
+    "summed",
+    "thinned",
+]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -69,3 +79,10 @@ def every_of(samples: int) -> int:
     (1, 17)
     """
     return 1 + samples // _BULK
+
+
+def count_alike(one: Mask | None, other: Mask | None) -> bool:
+    """Whether two masks are the same, (n,); None if all samples count."""
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)

@@ -22,7 +22,7 @@ from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
-from hmpim.identify.coupling.weak import COUPLED, Lag, coupling_fit, lag_of, whitening_of
+from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -141,7 +141,6 @@ def fit_together(
     if len(inputs) == 1:
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
-    coupled = tuple(name for name in structures if name in COUPLED) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
     i, leading = led or _lead(inputs, pairs, plainly)
@@ -156,9 +155,9 @@ def fit_together(
         if drifting is not None:
             return drifting
     richly = partial(fitted, structures=structures, shared=True)
-    _fit_in_turns(inputs, pairs, plainly, richly, coupled)
+    _fit_in_turns(inputs, pairs, plainly, richly, structures)
     if pairs.demote():
-        _fit_couplings(inputs, pairs, coupled)
+        _fit_couplings(inputs, pairs, structures)
     return _moved_at_once(pairs)
 
 
@@ -167,11 +166,11 @@ def _fit_in_turns(
     pairs: Pairs,
     plainly: Callable[..., JointFit],
     richly: Callable[..., JointFit],
-    coupled: tuple[StructureName, ...],
+    structures: tuple[StructureName, ...],
 ) -> None:
     """Fit the strong inputs and the couplings, in place, until moving all at once gains little."""
     least = pairs.cost
-    _fit_couplings(inputs, pairs, coupled)
+    _fit_couplings(inputs, pairs, structures)
     for _ in range(_TURNS):
         before = pairs.structures
         _fit_strong(inputs, pairs, richly)
@@ -183,7 +182,7 @@ def _fit_in_turns(
             least = pairs.cost
         others = pairs.structures != before
         if others or clearer:
-            _fit_couplings(inputs, pairs, coupled)
+            _fit_couplings(inputs, pairs, structures)
             pairs.refine(pairs.kept, None)
         if not others and pairs.cost * TWICE > cost:
             break  # otherwise each was fitted with wrong contributions of the others

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, count_alike
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -80,9 +80,7 @@ class Pairs:
         self._searched[i] = rest, counted
         if before is None or not np.array_equal(before[0], rest):
             return True
-        if before[1] is None or counted is None:
-            return before[1] is not counted
-        return not np.array_equal(before[1], counted)
+        return not count_alike(before[1], counted)
 
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which the contributions of some inputs are known."""

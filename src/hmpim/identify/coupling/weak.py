@@ -31,9 +31,9 @@ from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.sampled import delayed_response
 from hmpim.record import Intersample
 
-__all__ = ["COUPLED", "Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
+__all__ = ["Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
 
-COUPLED: tuple[StructureName, ...] = (*PLAIN, "second_order_high_pass")
+_COUPLED: tuple[StructureName, ...] = (*PLAIN, "second_order_high_pass")
 """Structures that a weak coupling may have."""
 
 _SMOOTHED = 0.1
@@ -77,16 +77,17 @@ def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0
     """
     if is_white(residual):
         return None
-    power = np.abs(scipy.fft.rfft(residual - residual.mean())) ** 2 / residual.size
+    answer = scipy.fft.rfft(residual - residual.mean())
+    power = np.abs(answer) ** 2 / residual.size
     power[0] = power[1]
     bins = np.arange(power.size)
     reach = np.maximum((_SMOOTHED * bins).astype(np.int64), _NARROWEST)
-    smooth = _noise(residual, inputs, late, reach) if inputs else averaged(power, reach)
+    smooth = _noise(answer, inputs, late, reach) if inputs else averaged(power, reach)
     return np.asarray(1.0 / np.sqrt(np.maximum(smooth, _FLOOR * power.mean())))
 
 
-def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[np.int64]) -> Real:
-    """Power at each bin, (m,), of what a local regression on the inputs leaves of a residual.
+def _noise(answer: Complex, inputs: Sequence[Real], late: float, reach: NDArray[np.int64]) -> Real:
+    """Power at each bin of what a local regression on the inputs leaves of a transform, (m,).
 
     One complex gain for each input and window (local methods of degree 0: Pintelon and Schoukens,
     System Identification, 2nd ed., Wiley 2012, ch. 7). The inputs are first delayed by `late`, so
@@ -96,10 +97,10 @@ def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[n
     edges = [1]
     while edges[-1] < reach.size:
         edges.append(min(edges[-1] + max(int(reach[edges[-1]]) // _PARTS, 1), reach.size))
-    turn = np.exp(-2j * np.pi * late / residual.size * np.arange(reach.size))
+    samples = inputs[0].size
+    turn = np.exp(-2j * np.pi * late / samples * np.arange(reach.size))
     spectra = [scipy.fft.rfft(u - u.mean()) * turn for u in inputs]
     moved = [one / max(float(np.linalg.norm(one)), 1e-300) for one in spectra]
-    answer = scipy.fft.rfft(residual - residual.mean())
     window = np.ones(2 * _PARTS + 1)  # parts, as differences of running sums would cancel
 
     def around(first: Complex, second: Complex) -> Complex:
@@ -112,7 +113,7 @@ def _noise(residual: Real, inputs: Sequence[Real], late: float, reach: NDArray[n
     count, whole = np.convolve(np.diff(edges), window, "same"), around(answer, answer).real
     rest = whole - np.einsum("ki,ki->k", cross.conj(), gains).real
     many = count > 2 * len(moved)
-    power = np.where(many, rest, whole) / (count - many * len(moved)) / residual.size
+    power = np.where(many, rest, whole) / (count - many * len(moved)) / samples
     centres = 0.5 * (np.array(edges[:-1]) + np.array(edges[1:]) - 1.0)
     return np.asarray(np.interp(np.arange(reach.size), centres, power))
 
@@ -131,7 +132,7 @@ def coupling_fit(
     longest, moves, answer = int(problem.longest_delay), plain.masked(u), plain.masked(y)
     rough = rough_response(moves, answer, longest_delay=longest)
     fits: list[Fit] = []
-    tried = tuple(name for name in structures if name in COUPLED) or COUPLED
+    tried = tuple(name for name in structures if name in _COUPLED) or _COUPLED
     if not np.any(rough.response):  # nothing that could show a pole
         tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
