@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 
 from hmpim.identify.arrays import Real, count_alike
-from hmpim.identify.chance import CLEARLY
+from hmpim.identify.chance import CLEARLY, LIKELIER
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
@@ -47,19 +47,27 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
 
     Not for clipped or held outputs, and not together with a changing gain.
     """
-    lead, most = fitted, 2 * CLEARLY
-    for gain, one, beside, other in _with_rows(question, seen, fitted, None):
-        if gain > most and leaves_noise(beside, one, seen.rounding):
-            bending, own = described(beside, one, question.aligned.fs)
-            lead = replace(
-                other,
-                fits=(without_rows(beside, slice(-1, None)),),
-                bending=bending,
-                covariances=(own,),
-                gaining=None,
-            )
-            most = gain
-    return lead
+    found = [
+        (gain, one, beside, other)
+        for gain, one, beside, other in _with_rows(question, seen, fitted, None)
+        if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding)
+    ]
+    if not found:
+        return fitted
+    most, one, beside, other = max(found, key=itemgetter(0))
+    others = {
+        row.kind: fit.best.fit
+        for gain, row, fit, _ in found
+        if row.kind != one.kind and gain > most - 2 * LIKELIER
+    }
+    bending, own = described(beside, one, question.aligned.fs)
+    return replace(
+        other,
+        fits=(without_rows(beside, slice(-1, None)),),
+        bending=replace(bending, others=others),
+        covariances=(own,),
+        gaining=None,
+    )
 
 
 def fit_with_row(
@@ -227,7 +235,8 @@ def _with_rows(
     which better dynamics would not recover.
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
-    if question.exact or is_explained(joint):
+    floor = seen.floor(question.output.values)
+    if question.exact or is_explained(source.values, joint, fs=question.aligned.fs, floor=floor):
         return
     if fitted.gaining is not None and fitted.gaining.taken:
         return

@@ -41,7 +41,6 @@ from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.lines import find_period
-from hmpim.identify.nonlinear.modelled import is_explained
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
@@ -71,15 +70,10 @@ def fit(
             return levelled
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
-        return seen, _keeping(course, drifting)
+        return seen, replace(drifting, begun=course)
     freed = free_from_wander(begun)
     calm = course if freed is begun else completed(freed)
-    return seen, _keeping(course, _fit_and_look_for_rows(question, seen, calm))
-
-
-def _keeping(course: Course, fitted: OutputFit) -> OutputFit:
-    """The fit with the plain fits, if a nonlinearity may be sought from them."""
-    return fitted if is_explained(fitted.fits[0]) else replace(fitted, begun=course)
+    return seen, replace(_fit_and_look_for_rows(question, seen, calm), begun=course)
 
 
 def _behind_levels(

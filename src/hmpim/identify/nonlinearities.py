@@ -3,8 +3,6 @@
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from hmpim.identify.added_row import add_row, add_row_of_leading, fit_with_row
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
@@ -18,7 +16,7 @@ from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import ROUNDING, WORTH
+from hmpim.identify.worth import WORTH
 from hmpim.record import Finding
 
 __all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends"]
@@ -98,7 +96,7 @@ def looked_through(
     """
     if question.instrument is not None:
         return joint, None, ()
-    aligned, best, floor = question.aligned, joint.best, _floor(question, found)
+    aligned, best, floor = question.aligned, joint.best, found.floor(question.output.values)
     source = aligned.inputs[i]
     problem, fit, bending = joint.problem, best.fit, joined.bending_of(i)
     if bending is not None:
@@ -136,11 +134,6 @@ def looked_through(
     return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
 
 
-def _floor(question: Question, found: Imperfections) -> float:
-    """R.m.s. of the rounding error, by the steps of the output or of the arithmetic."""
-    return max(found.rounding, ROUNDING * float(np.std(question.output.values)))
-
-
 def possible_bends(
     question: Question,
     found: Imperfections,
@@ -159,6 +152,6 @@ def possible_bends(
     if doubted or not alone or best.fit.structure.sampled:
         return ()
     u = question.aligned.inputs[i].values
-    floor = _floor(question, found)
+    floor = found.floor(question.output.values)
     own = bends(u, joint.weighed, best.fit, intersample=best.intersample, fs=fs, floor=floor)
     return (*own, *plainer_bends(u, joint, plain, fs=fs, floor=floor))

@@ -16,7 +16,7 @@ from hmpim.identify.coupling.responses import (
     with_noise_doubted,
 )
 from hmpim.identify.effects.censored import CensoredFit
-from hmpim.identify.effects.drift import Drifting, drift_findings
+from hmpim.identify.effects.drift import drift_findings
 from hmpim.identify.effects.findings import with_imperfections
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
@@ -263,7 +263,7 @@ def _evidence(
         fs=fs,
         highest=min(band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
-        others=_other_explanations(gaining, joined.drifting if i == joined.asked else None),
+        others=_other_explanations(gaining, joined, i),
         owed=evidence.owed,
     )
     if any(one.matters for one in moves):
@@ -282,9 +282,12 @@ def _left(question: Question, joint: JointFit, i: int, matrix: Responses | None)
     return misfit(u, fit.residual, delay=fit.delay, band=(low / fs, high / fs))
 
 
-def _other_explanations(gaining: GainChange | None, drifting: Drifting | None) -> list[Fit]:
-    """Alternative fits, with or without a changing gain or bias, that the record cannot exclude."""
+def _other_explanations(gaining: GainChange | None, joined: OutputFit, i: int) -> list[Fit]:
+    """Alternative fits that the record cannot exclude: another gain, bias, or nonlinearity."""
     others = [] if gaining is None else [*gaining.others]
+    drifting, bending = joined.drifting if i == joined.asked else None, joined.bending_of(i)
+    if bending is not None:
+        others.extend(bending.others.values())
     if drifting is not None and drifting.rival is not None:
         others.append(drifting.rival)
     return others

@@ -28,7 +28,7 @@ from hmpim.identify.fitting.data import prepared
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of
-from hmpim.identify.worth import FEW, NEARLY, TWICE
+from hmpim.identify.worth import FEW, NEARLY, ROUNDING, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.record import Intersample
 
@@ -76,6 +76,10 @@ class Imperfections:
     def rounding(self) -> float:
         """R.m.s. rounding error; 0 if there is no rounding."""
         return 0.0 if self.quantization is None else self.quantization.noise_std
+
+    def floor(self, y: Real) -> float:
+        """R.m.s. rounding error of an output, (n,): by its steps, or by those of the arithmetic."""
+        return max(self.rounding, ROUNDING * float(np.std(y)))
 
     def arrivals(self, samples: int, fs: float) -> Updates | None:
         """Samples in which a held output is updated."""

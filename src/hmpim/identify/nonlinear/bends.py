@@ -22,6 +22,7 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.kept import kept
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.mechanisms import (
@@ -84,6 +85,7 @@ class Bend:
         return np.asarray(self.moved * (1.0 + HALF / np.sqrt(2.0 * self.gain)))
 
 
+@kept
 def bends(
     u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float, floor: float = 0.0
 ) -> tuple[Bend, ...]:

@@ -5,8 +5,8 @@ Successive approximations (É. Picard, J. Math. Pures Appl. 6, 1890), extrapolat
 agree.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -76,6 +76,7 @@ class Modelled:
     trend: Real  # (n,): its effect on the output
     waits: Mask | None  # (n,): samples that do not depend on the linear part
     part: NonlinearPart  # what a model needs of it
+    others: Mapping[Kind, Fit] = field(default_factory=dict)  # kinds about as likely, with fits
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
@@ -97,11 +98,18 @@ _UNIT: dict[Kind, int] = {"dead_zone": 0, "backlash": 1, "friction": 1}
 """Whose unit a size has: the input's or the output's; others are shares."""
 
 
-def is_explained(joint: JointFit) -> bool:
-    """Whether plain dynamics leave white noise, so that no nonlinearity need be sought."""
-    fit = joint.best.fit
-    plain = fit.structure.name in PLAIN and is_white(joint.problem.counting(fit.residual))
-    return plain or fit.structure.sampled or joint.problem.y.size > LONGEST
+def is_explained(u: Real, joint: JointFit, *, fs: float, floor: float) -> bool:
+    """Whether no nonlinearity need be sought: plain dynamics leave white noise without a trace.
+
+    The input has shape (n,), `fs` is in Hz; effects up to `floor` are rounding errors (r.m.s.).
+    """
+    best, fit = joint.best, joint.best.fit
+    if fit.structure.sampled or joint.problem.y.size > LONGEST:
+        return True
+    if fit.structure.name not in PLAIN or not is_white(joint.problem.counting(fit.residual)):
+        return False
+    seen = bends(u, joint.weighed, fit, intersample=best.intersample, fs=fs, floor=floor)
+    return not any(bend.matters for bend in seen)
 
 
 def linear_starts(
@@ -135,10 +143,10 @@ def kinds_in_question(
 ) -> dict[Kind, list[Fit]]:
     """Kinds that may explain the residual of linear fits, the likeliest first, with these fits.
 
-    None if the plain fit, the first, leaves white noise, or if poles explain what no nonlinearity
-    can. Of a servo, friction is in question where play looks likely as well.
+    None if poles explain what no nonlinearity can. Of a servo, friction is in question where play
+    looks likely as well.
     """
-    if problem.counted < _FEWEST or starts[0].is_white:
+    if problem.counted < _FEWEST:
         return {}
     found: dict[Kind, list[Fit]] = {}
     for fit in starts:
@@ -347,11 +355,13 @@ def _stable_steps(fit: Fit, steps: Real) -> Real:
 
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
     """State which nonlinearity is part of the model; the units are the input's and the output's."""
+    others = " or ".join(KIND_WORDS[kind] for kind in one.others)
+    instead = f" The record may contain {others} instead: the intervals allow for it."
     return Finding(
         code=one.kind,
-        message=f"The model includes {KIND_WORDS[one.kind]}: {size_in_words(one.part, units)}. "
-        "The figures are those of the linear part. Include this effect in a simulation, or keep "
-        "the stimulus away from it.",
+        message=f"The model includes {KIND_WORDS[one.kind]}: {size_in_words(one.part, units)}."
+        f"{instead if others else ''} The figures are those of the linear part. Include this "
+        "effect in a simulation, or keep the stimulus away from it.",
         severity="info",
         parameters=(),
     )
