@@ -16,7 +16,7 @@ from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.residual import misfits_of_inputs
 from hmpim.identify.coupling.weak import unsettled
-from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.frf.multivariable import JointResponse, joint_response
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result import (
     Estimate,
@@ -105,7 +105,7 @@ def responses_of(
         coherence=OutputCoherence(
             output=output.name,
             frequency=_joined([m.frequency for _, m in pieces]),
-            multiple=_joined([m.multiple_coherence[:, 0] for _, m in pieces]),
+            multiple=_joined([m.multiple_coherence for _, m in pieces]),
         ),
         left=cache(
             lambda: misfits_of_inputs(
@@ -120,7 +120,7 @@ def responses_of(
 
 def _pieces(
     aligned: Aligned, output: Signal, counts: Mask | None, joined: OutputFit, inputs: InputSet
-) -> list[tuple[list[int], ResponseMatrix]]:
+) -> list[tuple[list[int], JointResponse]]:
     """Responses in each band, and the inputs that they belong to.
 
     The band is cut where one of the inputs' begins or ends. The response to an input outside its
@@ -135,7 +135,7 @@ def _pieces(
         y, whole = y - joined.disturbance, whole - joined.disturbance
     span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
-    pieces: list[tuple[list[int], ResponseMatrix]] = []
+    pieces: list[tuple[list[int], JointResponse]] = []
     for low, high in pairwise(edges):
         active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
         bins = (high - low) * span
@@ -145,24 +145,23 @@ def _pieces(
         for j, part in enumerate(parts):
             if j not in active and joined.fits[j].related:
                 rest, modelled = rest - part, modelled - part
-        found = response_matrix(
+        found = joint_response(
             np.stack([aligned.inputs[j].values for j in active]),
-            rest[None, :],
+            rest,
             aligned.fs,
-            delays=[[delay]],
+            delay=delay,
             band=(low, high),
             valid=counts,
-            fill=modelled[None, :],
-            points=200,
+            fill=modelled,
             names=[*(aligned.inputs[j].name for j in active), output.name],
         )
         pieces.append((active, found))
     return pieces
 
 
-def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
+def _column(pieces: list[tuple[list[int], JointResponse]], j: int) -> FrequencyResponse:
     """One input's response at the frequencies where the inputs are distinguished."""
-    own = [(m, (m.usable, 0, active.index(j))) for active, m in pieces if j in active]
+    own = [(m, (m.usable, active.index(j))) for active, m in pieces if j in active]
     return FrequencyResponse(
         frequency=_joined([m.frequency[m.usable] for m, _ in own]),
         response=np.asarray(_joined([m.response[at] for m, at in own]), dtype=np.complex128),
