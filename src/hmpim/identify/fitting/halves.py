@@ -52,14 +52,6 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
         The output about its mean, weighted like the residual; 0 where a sample does not count.
     share : float
         Independent samples per sample.
-
-    Examples
-    --------
-    >>> rows = np.ones((1, 200))
-    >>> drifting = np.concatenate([-np.ones(100), np.ones(100)])
-    >>> halves = products_of_halves(rows, drifting + 0.1 * rows[0])
-    >>> compare_halves(halves, drifting, share=1.0).probability < 1e-6
-    True
     """
     chance, gained = halves_of(halves[:, None], y.size, share=share)
     power, size = float(halves[:, -1, -1].sum()), float(np.vecdot(y, y))

@@ -92,18 +92,6 @@ def bends(
     None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
     nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
     its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model import STRUCTURES
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = u - np.clip(u, -0.1, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> best = bends(u, data, fit, intersample="foh", fs=100.0)[0]
-    >>> best.kind, best.certain, abs(fit.linear + best.moved[1:]).round(2).tolist()
-    ('dead_zone', True, [1.0, 0.0])
     """
     given = fit
     u, problem, fit = _shortened(u, problem, fit, intersample)

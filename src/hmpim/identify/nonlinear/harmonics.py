@@ -72,16 +72,6 @@ def sweep_harmonics(
     The residual, (n,), is output less prediction, 0 where a sample does not count; `fs` is in Hz.
     The harmonics arrive later than the sweep by the system's delay, in s. What follows the sweeps
     of other inputs is no harmonic of this one.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> found = sweep_harmonics(0.1 * (u**3 - 0.75 * u) + noise, sweep_phase(u, 200.0), 200.0)
-    >>> [h.order for h in found.orders if h.probability < 1e-4], round(found.rms(1), 3)
-    ([3], 0.017)
     """
     view = view_of(residual, sweep, fs, delay)
     if view is None:
@@ -94,16 +84,6 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
 
     It takes a tenth of the work of `sweep_harmonics`, and holds only for white residuals. The delay
     in s is rounded to a sample, which turns the harmonics of a stretch but keeps their size.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> two = np.stack((noise, 0.01 * u**2 + noise))
-    >>> (any_harmonics(two, sweep_phase(u, 200.0), 200.0, delay=0.0) > 0.01).tolist()
-    [True, False]
     """
     chances = np.ones(residuals.shape[0])
     view = view_of(np.ones(residuals.shape[1]), sweep, fs, np.rint(delay * fs) / fs)

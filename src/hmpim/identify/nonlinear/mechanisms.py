@@ -121,19 +121,6 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     """Fit each kind of nonlinearity to the residual of a linear fit, the likeliest first.
 
     Each kind whose weight has the right sign is returned once; `fs` is the rate in Hz.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model.sampled import prepare_input
-    >>> from hmpim.model import STRUCTURES
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> best = compare_mechanisms(data, fit, fs=100.0)[0]
-    >>> best.kind, round(best.size, 1)
-    ('backlash', 0.1)
     """
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0:
         return ()

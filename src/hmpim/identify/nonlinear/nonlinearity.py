@@ -58,19 +58,6 @@ def inspect_nonlinearity(
     output at the same time, only harmonics are tested. Effects up to `floor` are ignored, the
     r.m.s. error of rounding in the output's unit. If the nonlinearity is `modelled`, `fit` is the
     linear part of that model, and its residual includes the nonlinear part.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model import STRUCTURES, prepare_input
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> y = u - 0.1 * u**3 + 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> found = inspect_nonlinearity(u, data, fit, fs=200.0)
-    >>> found.seen.mechanisms[0].kind, [finding.code for finding in found.findings]
-    ('curvature', ['nonlinear'])
     """
     output = float(np.std(problem.counting(problem.y)))
     block = -(-u.size // LONGEST)

@@ -65,16 +65,6 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     No limit is tried if the residual of a plain fit is white, or if a richer fit has less than 1/25
     of the best plain one's cost. None unless a limit explains more than the linear fit (odds of 400
     to 1), and more than any other kind of nonlinearity.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.joint import joint_fit
-    >>> t = np.arange(600) / 100
-    >>> u = np.sin(2 * np.pi * (0.1 * t + 0.067 * t**2))
-    >>> y = np.convolve(rate_limited(u, 0.04), np.ones(5) / 5)[:600]
-    >>> y += 0.01 * np.random.default_rng(0).standard_normal(600)
-    >>> round(limited_command(u, joint_fit(u, y)).speed, 3)
-    0.04
     """
     best, problem = joint.best, joint.problem
     known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)

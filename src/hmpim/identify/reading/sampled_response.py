@@ -19,17 +19,7 @@ __all__ = ["sampled_response"]
 def sampled_response(
     system: RationalDelay, frequency: Real, *, fs: float, intersample: Intersample
 ) -> Complex:
-    """Response from samples of the input to samples of the output, at frequencies in Hz, (m,).
-
-    Examples
-    --------
-    A delay of half a sample shows only at the next one:
-
-    >>> half = RationalDelay(delay=0.005, numerator=np.ones(1), denominator=np.ones(1))
-    >>> held = sampled_response(half, np.array([10.0]), fs=100.0, intersample="zoh")
-    >>> round(float(np.degrees(np.angle(held[0]))), 6)
-    -36.0
-    """
+    """Response from samples of the input to samples of the output, at frequencies in Hz, (m,)."""
     if intersample not in ("zoh", "foh"):
         return response(system, frequency)
     whole = np.floor(system.delay * fs + 1e-9) / fs  # may be negative, unlike that of a program
