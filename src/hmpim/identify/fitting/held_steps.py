@@ -65,16 +65,8 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
 
     With y = C x + D u behind a delay of d + f samples, d whole, the input last stepped 1 - f before
     a sample. The samples determine C e^{A (1 - f)} and D + C Γ(1 - f), with Γ the integral of
-    e^{At} B, and from these follow C and D at any other f.
-
-    Parameters
-    ----------
-    structure : Structure
-        One for which `in_whole_samples` is true, with poles.
-    theta : ndarray, shape (1 + order,)
-        Delay in samples, parameters of the sections.
-    linear : ndarray, shape (m + 1,)
-        Numerator and bias.
+    e^{At} B, and from these follow C and D at any other f. `in_whole_samples` is true of the
+    structure, which has poles; theta, (1 + order,), and linear, (m + 1,), are as of a `Fit`.
     """
     below = denominator_of(structure, coefficients_of(structure, theta[1:]))
     order, first = structure.order, structure.dc_zeros

@@ -107,12 +107,7 @@ def chosen_of(
 ) -> JointFit:
     """Finish the search once the plain structures are fitted to the samples that count.
 
-    Parameters
-    ----------
-    course : Course
-        The plain fits under the natural assumption.
-    structures, growing
-        As for `joint_fit`.
+    The course has the plain fits under the natural assumption; the rest is as for `joint_fit`.
     """
     fitted = continue_between(course)
     if is_unanswered(course, fitted):

@@ -164,11 +164,6 @@ def is_exact(u: Real, y: Real) -> bool:
     """Whether a difference equation holds to rounding: only software has no noise at all.
 
     All lagged samples together are tested first, on a few equations, then each filter.
-
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Samples of input and output.
     """
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
@@ -192,17 +187,9 @@ def software_fit(
 ) -> JointFit:
     """Fit every filter at every possible delay, and keep the one that the record supports.
 
-    Parameters
-    ----------
-    u, y, valid, nuisance
-        As for `hmpim.identify.fitting.joint.joint_fit`.
-    structures : tuple of str
-        Those in `FILTERS` are tried; all of `FILTERS` if there are none.
-
-    Returns
-    -------
-    JointFit
-        A trial for each structure and delay that was fitted.
+    Those of the `structures` that are filters are tried, all of `FILTERS` if there are none; the
+    rest is as for `hmpim.identify.fitting.joint.joint_fit`. There is a trial for each structure and
+    delay that was fitted.
     """
     names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
     return _software_fit(u, y, None if valid is None or valid.all() else valid, names, nuisance)

@@ -25,43 +25,21 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointFit:
-    """The chosen trial, all others, and the data they were fitted to.
+    """The chosen trial, all others, and the data they were fitted to."""
 
-    Parameters
-    ----------
-    problem : Problem
-        The data under the chosen assumption, with the samples that counted.
-    weighed : Problem
-        The same with the noise whitened, as all trials were compared.
-    best : Trial
-        The chosen one.
-    trials : tuple of Trial
-        All, the chosen one included.
-    forgotten : int
-        Samples omitted at the beginning because the record does not begin at rest: the output
-        there still depends on earlier input.
-    effective_share : float
-        Independent samples per sample, from the best residual's correlation.
-    related : bool
-        Whether the best model explains more than a constant does.
-    silent : bool
-        Whether no model can: the output does not answer the input at all.
-    rivals : tuple of Trial
-        Fits with one more pole, under the chosen assumption, that lose only by its price.
-    hidden : HiddenPole or None
-        The test for one more pole; None if it was not made.
-    """
-
-    problem: Problem
-    weighed: Problem
+    problem: Problem  # the data under the chosen assumption, with the samples that counted
+    weighed: Problem  # the same with the noise whitened, as all trials were compared
     best: Trial
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial, ...]  # all, the chosen one included
+    # samples omitted at the beginning because the record does not begin at rest: the output
+    # there still depends on earlier input
     forgotten: int
-    effective_share: float
-    related: bool
-    silent: bool = False
+    effective_share: float  # independent samples per sample, from the best residual's correlation
+    related: bool  # whether the best model explains more than a constant does
+    silent: bool = False  # whether no model can: the output does not answer the input at all
+    # fits with one more pole, under the chosen assumption, that lose only by its price
     rivals: tuple[Trial, ...] = ()
-    hidden: HiddenPole | None = None
+    hidden: HiddenPole | None = None  # the test for one more pole; None if it was not made
 
     @property
     def lingers(self) -> bool:
