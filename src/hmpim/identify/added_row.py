@@ -31,14 +31,14 @@ from hmpim.identify.nonlinear.modelled import (
     linear_starts,
     settled_rows,
 )
-from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
+from hmpim.identify.nonlinear.rows import Command, NonlinearRow, with_row
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import FEW, TWICE
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
 
-_Found = tuple[float, Nonlinearity, JointFit, OutputFit]
+_Found = tuple[float, NonlinearRow, JointFit, OutputFit]
 """Gain in Schwarz's criterion by a row, the row, the fit with it, and the fit without it."""
 
 
@@ -106,7 +106,7 @@ def _alone(question: Question, i: int, y: Real) -> Question:
     )
 
 
-def _counting(question: Question, one: Nonlinearity) -> Question:
+def _counting(question: Question, one: NonlinearRow) -> Question:
     """The same question without samples of the output that do not count with a row."""
     if one.counts is None:
         return question
@@ -160,11 +160,11 @@ def _fit_beside(
     question: Question,
     seen: Imperfections,
     i: int,
-    one: Nonlinearity,
+    one: NonlinearRow,
     size: float,
     *,
     steadily: bool,
-) -> tuple[OutputFit, JointFit, Nonlinearity] | None:
+) -> tuple[OutputFit, JointFit, NonlinearRow] | None:
     """Fit all inputs to the output without a row of a size, and compute the row again from that.
 
     Without a drift and hum, if `steadily`. None if the output then does not follow input `i`.
@@ -183,8 +183,8 @@ def _moved_by_others(fitted: OutputFit, i: int) -> Real:
 
 
 def _joined(
-    fitted: OutputFit, i: int, one: Nonlinearity, trend: Real
-) -> tuple[JointFit, Nonlinearity]:
+    fitted: OutputFit, i: int, one: NonlinearRow, trend: Real
+) -> tuple[JointFit, NonlinearRow]:
     """The leading fit with the row, which is computed once more with this fit, and the row."""
     joint = fitted.fits[i]
     former, best = joint.best, joint.best.fit
@@ -278,7 +278,7 @@ def _plain(
 
 
 def _fitted_with(
-    question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
+    question: Question, seen: Imperfections, problem: Problem, one: NonlinearRow
 ) -> JointFit:
     """Fit every structure with a row for a nonlinearity."""
     question = _counting(question, one)
@@ -308,7 +308,7 @@ def _likeliest(
     former: Problem,
     count: int,
     rounding: float,
-) -> tuple[Nonlinearity | None, float]:
+) -> tuple[NonlinearRow | None, float]:
     """The row of a kind that gains most in Schwarz's criterion, if any does, and what it leaves.
 
     With the dynamics of its start, or, unless it acts within these, with those that lead. Of
@@ -316,7 +316,7 @@ def _likeliest(
     The second value is the power of the residual.
     """
     best, white = joint.best.fit, False
-    found: Nonlinearity | None = None
+    found: NonlinearRow | None = None
     lead, led = best, former  # the likeliest fit so far, and its data
     for start in starts:
         for one in settled_rows(kind, command, problem, start):

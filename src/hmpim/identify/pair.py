@@ -200,7 +200,7 @@ def _summary(
     summary = inspection.summary
     if modelled is None:
         return summary
-    return replace(summary, kinds=(modelled.kind,), size=modelled.estimate(units))
+    return replace(summary, kinds=(modelled.part.kind,), size=modelled.estimate(units))
 
 
 def _of_the_question(question: Question, unit: str) -> Iterator[Finding]:

@@ -19,14 +19,14 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.fine import linear_part
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Kind
+from hmpim.identify.nonlinear.mechanisms import LONGEST, Kind
 from hmpim.identify.nonlinear.rows import (
     TURNS,
     Command,
-    Nonlinearity,
+    NonlinearRow,
     dead_zone,
     first_rows,
+    linear_part,
     with_row,
 )
 from hmpim.identify.result import Estimate
@@ -67,20 +67,14 @@ _FEWEST = 100
 class Modelled:
     """A nonlinearity that is part of the model."""
 
-    kind: Kind
-    # Half of the gap of backlash, or the deflection at which the restoring force equals friction,
-    # in the output's unit; half the width of a dead zone in the input's. Otherwise the share by
-    # which the force, or the output, at the largest deflection departs from proportion.
-    size: float
-    std: float  # standard deviation of the size
     trend: Real  # (n,): its effect on the output
     waits: Mask | None  # (n,): samples that do not depend on the linear part
     part: NonlinearPart  # what a model needs of it
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
-        unit = units[_UNIT[self.kind]] if self.kind in _UNIT else ""
-        return estimate(self.size, self.std**2, unit=unit)
+        unit = units[_UNIT[self.part.kind]] if self.part.kind in _UNIT else ""
+        return estimate(self.part.size, self.part.std**2, unit=unit)
 
     def as_measured(self, joint: JointFit) -> tuple[Problem, Fit]:
         """The output with the nonlinearity, and the linear part, which leaves it over."""
@@ -160,7 +154,7 @@ def kinds_in_question(
 
 def settled_rows(
     kind: Kind, command: Command, problem: Problem, start: Fit
-) -> Iterator[Nonlinearity]:
+) -> Iterator[NonlinearRow]:
     """Rows of a kind, each from a fit of the same structure that agrees with it.
 
     The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
@@ -177,7 +171,7 @@ def settled_rows(
             yield replace(found, between=command.intersample)
 
 
-def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity | None:
+def _in_turns(one: NonlinearRow, problem: Problem, start: Fit) -> NonlinearRow | None:
     """The row and the fit, each from the other until both agree; None if they do not.
 
     They agree where the fit gains nothing that an error bar shows.
@@ -241,7 +235,7 @@ def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
     return fit.cost < TWICE * problem.counted * rounding**2
 
 
-def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
+def leaves_noise(joint: JointFit, one: NonlinearRow, rounding: float) -> bool:
     """Whether a fit leaves noise, also at samples that do not depend on the linear part.
 
     Rounding may look like an effect that is smaller than itself.
@@ -256,7 +250,7 @@ def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, Real]:
+def described(joint: JointFit, one: NonlinearRow, fs: float) -> tuple[Modelled, Real]:
     """The nonlinearity as the fit with its row, the last of its rows, has it, at `fs` in Hz.
 
     The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
@@ -294,11 +288,11 @@ def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, 
         between=one.between,
         lag=one.lag / fs,
     )
-    found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits, part=part)
+    found = Modelled(trend=size * row, waits=waits, part=part)
     return found, np.asarray(own[:-1, :-1])
 
 
-def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
+def _moved_rows(joint: JointFit, one: NonlinearRow, scale: Real) -> Real:
     """Derivatives of the nonlinear effect by theta, `fit.linear` and its size, (p + 1, n).
 
     Differences over a standard deviation, `scale`, to either side, since samples begin and cease to
@@ -348,8 +342,8 @@ def _stable_steps(fit: Fit, steps: Real) -> Real:
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
     """State which nonlinearity is part of the model; the units are the input's and the output's."""
     return Finding(
-        code=one.kind,
-        message=f"The model includes {KIND_WORDS[one.kind]}: {size_in_words(one.part, units)}. "
+        code=one.part.kind,
+        message=f"The model includes {one.part.words}: {size_in_words(one.part, units)}. "
         "The figures are those of the linear part. Include this effect in a simulation, or keep "
         "the stimulus away from it.",
         severity="info",
