@@ -16,7 +16,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -57,9 +57,6 @@ _REFINED = 4
 
 _TASTE = 6
 """Steps from each start before the best ones are fitted to convergence."""
-
-_POLISHED = 1e-6
-"""Precision of the chosen fits, see `fit_structure`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -265,7 +262,7 @@ def _followed(
     least = min(fit.cost for fit in fits)
     for i, fit in enumerate(fits):
         if fit.structure.order and fit.cost <= TWICE * least:
-            fits[i] = refit(problem, fit, precision=_POLISHED)
+            fits[i] = polished(problem, fit)
     return fits
 
 

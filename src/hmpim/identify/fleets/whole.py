@@ -35,6 +35,7 @@ from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.mechanisms import LONGEST
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
@@ -54,9 +55,6 @@ from hmpim.model import RationalDelay
 from hmpim.record import Finding
 
 __all__ = ["Whole", "learn_whole", "whole_pairs"]
-
-_LONGEST = 32768
-"""Greatest number of samples that `identify` uses one by one."""
 
 _SPARE = 6
 """Figures that the lines of a stimulus must determine: four of a second-order model, and two."""
@@ -90,7 +88,7 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     u, fs = fleet.u, fleet.fs
     sweep = sweep_phase(u, fs)
     noise = input_noise(u, fs, band=fleet.band)
-    if u.size > _LONGEST or (sweep is None and find_period(u) is not None):
+    if u.size > LONGEST or (sweep is None and find_period(u) is not None):
         return None
     if 2 * lines_of(u).count < _SPARE or (noise is not None and noise.attenuation > WORTH):
         return None

@@ -159,8 +159,6 @@ def settled_rows(
 
     The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
     """
-    if start.structure.name in _SERVOS and kind != "friction":
-        return
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)
         if found is not None:
@@ -301,8 +299,6 @@ def _moved_rows(joint: JointFit, one: NonlinearRow, scale: Real) -> Real:
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
     out = np.zeros((vector.size, problem.y.size))
-    if one.within is not None and one.within.structure != fit.structure:
-        return out
 
     def effect(at: Real) -> Real:
         theta, linear = at[: fit.theta.size], at[fit.theta.size : -1]

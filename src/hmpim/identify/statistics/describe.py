@@ -54,13 +54,13 @@ _FREQUENCIES = 200
 def identify_statistics(
     statistics: Statistics,
     *,
-    intersample: Intersample | None = None,
-    structures: tuple[StructureName, ...] | None = None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
 ) -> Identification:
     """Identify one pair from compressed records.
 
-    The input between its samples is by default as the statistics state it, or the likeliest, and
-    all structures are tried; integrators are tried in any case, and refused.
+    The input between its samples is the likeliest if it is not stated. Integrators are tried in any
+    case, and refused.
 
     Raises
     ------
@@ -69,9 +69,7 @@ def identify_statistics(
         window, as that of an integrator is.
     """
     _check_moves(statistics)
-    data, joint = choose(
-        statistics, intersample=intersample or statistics.intersample, structures=structures
-    )
+    data, joint = choose(statistics, intersample=intersample, structures=structures)
     if joint.related:
         _check_window(statistics, as_fitted(joint.best.fit))
     found = integrator_of(statistics, data, joint)
