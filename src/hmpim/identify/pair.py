@@ -36,8 +36,6 @@ from hmpim.identify.nonlinearities import looked_through, possible_bends
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
-from hmpim.identify.reading.candidates import candidates_of
-from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
@@ -193,7 +191,7 @@ def _pair(own: _Followed) -> PairIdentification:
     part = None if bending is None else bending.part
     if question.limited is not None:
         part = question.limited.part(aligned.fs)
-    numerator, denominator = coefficients_of(readings.system)
+    numerator, denominator = readings.coefficients
     return PairIdentification(
         input=own.source.name,
         output=output.name,
@@ -205,7 +203,7 @@ def _pair(own: _Followed) -> PairIdentification:
         frequency_response=response,
         numerator=numerator,
         denominator=denominator,
-        candidates=candidates_of(joint, lambda one: float(fit_percent(one.cost, spread))),
+        candidates=joint.candidates(lambda one: float(fit_percent(one.cost, spread))),
         warnings=(
             *aligned.findings,
             *_of_the_question(question, units[0]),
@@ -219,7 +217,7 @@ def _pair(own: _Followed) -> PairIdentification:
         time=aligned.time,
         prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
         residual=fit.residual if course is None else fit.residual * course,
-        covariance=highest_first(readings.coefficient_covariance, readings.system),
+        covariance=readings.by_falling_powers,
         nonlinearity=None if inspection is None else _summary(inspection, bending, units),
         nonlinear_part=part,
     )

@@ -1,5 +1,6 @@
 """All trials of a joint fit, and the choice among them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from hmpim.identify.chance import LIKELIER
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
+from hmpim.identify.result import Candidate
 from hmpim.identify.worth import MUCH
 from hmpim.record import Intersample
 
@@ -52,6 +54,19 @@ class JointFit:
     def weighed_share(self) -> float:
         """Independent samples per sample of `weighed`: 1 if the noise is whitened."""
         return self.effective_share if self.weighed.noise is None else 1.0
+
+    def candidates(self, percent: Callable[[Fit], float]) -> tuple[Candidate, ...]:
+        """Every trial, the likeliest first; `percent` gives the fit in per cent."""
+        return tuple(
+            Candidate(
+                structure=trial.fit.structure.name,
+                intersample=trial.intersample,
+                criterion=trial.criterion,
+                fit_percent=percent(trial.fit),
+                chosen=trial is self.best,
+            )
+            for trial in sorted(self.trials, key=lambda trial: trial.criterion)
+        )
 
 
 def schwarz(cost: float, count: float, parameters: int) -> float:

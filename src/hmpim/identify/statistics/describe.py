@@ -10,8 +10,6 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
 from hmpim.identify.judgement.checks import COMPRESSED
 from hmpim.identify.judgement.verdict import unfollowed
-from hmpim.identify.reading.candidates import candidates_of
-from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned, without_noise
@@ -166,7 +164,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         parameters = without_noise(parameters, _DIGITS)
     else:
         findings = (*findings, *nonlinear_findings(statistics, data.beyond(best), evidence))
-    numerator, denominator = coefficients_of(system)
+    numerator, denominator = readings.coefficients
     # Equation (8): the lag of the cross-correlation's peak. The paper's other steps need samples.
     late = np.abs(correlations(statistics)[1][statistics.reach.forth :])
     frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
@@ -187,9 +185,9 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         ),
         numerator=numerator,
         denominator=denominator,
-        candidates=candidates_of(joint, percent),
+        candidates=joint.candidates(percent),
         warnings=(*findings, _no_samples(statistics)),
-        covariance=highest_first(spread, system),
+        covariance=readings.by_falling_powers,
     )
 
 
