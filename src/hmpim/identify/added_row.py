@@ -25,7 +25,7 @@ from hmpim.identify.nonlinear.modelled import (
     ALIKE,
     described,
     is_explained,
-    is_noise,
+    is_rounding,
     kinds_in_question,
     leaves_noise,
     linear_starts,
@@ -329,7 +329,7 @@ def _likeliest(
                 # Compared at samples that count in both: of friction, other samples may stick.
                 if criterion_gain(again, count if found is None else 0, lead, led) > 0.0:
                     found, lead, led = one, fit, data
-            if one.within is not None and is_noise(data, fit, rounding):
+            if one.within is not None and (fit.is_white or is_rounding(data, fit, rounding)):
                 break
         if white:
             break

@@ -1,7 +1,7 @@
 """All trials of a joint fit, and the choice among them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -54,6 +54,12 @@ class JointFit:
     def weighed_share(self) -> float:
         """Independent samples per sample of `weighed`: 1 if the noise is whitened."""
         return self.effective_share if self.weighed.noise is None else 1.0
+
+    def with_fit(self, fit: Fit) -> "JointFit":
+        """The same with another fit of the chosen trial."""
+        best = replace(self.best, fit=fit)
+        trials = tuple(best if trial is self.best else trial for trial in self.trials)
+        return replace(self, best=best, trials=trials)
 
     def candidates(self, percent: Callable[[Fit], float]) -> tuple[Candidate, ...]:
         """Every trial, the likeliest first; `percent` gives the fit in per cent."""

@@ -42,7 +42,7 @@ __all__ = [
     "Modelled",
     "described",
     "is_explained",
-    "is_noise",
+    "is_rounding",
     "kinds_in_question",
     "leaves_noise",
     "linear_starts",
@@ -223,13 +223,8 @@ def _ahead(tried: list[Real], changes: list[Real]) -> Real:
     return np.asarray(last - weights @ (moves + differences))
 
 
-def is_noise(problem: Problem, fit: Fit, rounding: float) -> bool:
-    """Whether a residual is white, or mostly rounding error, of which `rounding` is the r.m.s."""
-    return is_rounding(problem, fit, rounding) or fit.is_white
-
-
 def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
-    """Whether most of a residual is rounding error, which a slow motion colours."""
+    """Whether most of a residual is rounding error, of that r.m.s.; a slow motion colours it."""
     return fit.cost < TWICE * problem.counted * rounding**2
 
 

@@ -8,13 +8,14 @@ records: `hmpim.identify.records.levels`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hmpim.identify.arrays import Real, thinned
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, criterion_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
 from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
@@ -65,7 +66,8 @@ def inspect_nonlinearity(
     subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
     outcome = inspect_fit(subject, fit)
     if plain is not None and outcome.rms > 0:
-        outcome = better_of(subject, outcome, inspect_fit(subject, plain))
+        both = outcome, inspect_fit(subject, plain)
+        outcome = min(both, key=partial(criterion_of, subject))
     matters = outcome.effect > WORTH * output and outcome.rms > floor
     named = outcome.named if matters else ()
     shares = _shares(outcome, outcome.fit.cost / max(problem.counted, 1))

@@ -13,6 +13,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.data import polished
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -232,16 +233,8 @@ def with_free_speed(joint: JointFit, slope: Real) -> JointFit:
     """
     problem = joint.problem.with_row(slope)
     weighed = replace(joint.weighed, nuisance=problem.nuisance)
-    structure, theta = joint.best.fit.structure, joint.best.fit.theta
-    fit = fit_structure(weighed, structure, theta, precision=weighed.final)
-    best = replace(joint.best, fit=fit)
-    return replace(
-        joint,
-        problem=problem,
-        weighed=weighed,
-        best=best,
-        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
-    )
+    free = joint.with_fit(polished(weighed, joint.best.fit))
+    return replace(free, problem=problem, weighed=weighed)
 
 
 def _followed(fine: Real, step: float) -> Real:
