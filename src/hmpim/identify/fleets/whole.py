@@ -200,7 +200,7 @@ def _shapes_of(fleet: Fleet) -> Real:
     values = member.surface.values(place[None])[0]
     alone = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
     mode, fit = member.intersample, alone.best.fit
-    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
+    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode)
 
 
 def _cover_bends(
@@ -230,7 +230,7 @@ def _cover_bends(
         i, j = int(some[k]), int(group.some[some[k]])
         alone = alone_of(fleet, member, group.fit.theta[j], outputs[k])
         mode, fit = member.intersample, alone.best.fit
-        bent = bends(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
+        bent = bends(fleet.u, alone.problem, fit, intersample=mode)
         if not bent:
             continue
         covered[k] = not bent[0].certain and not group.has_tail(i)

@@ -198,12 +198,14 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
-def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
+def hypotheses(
+    x: Real, denominator: Real, fs: float = 1.0, *, every: int = 1
+) -> Iterator[Hypothesis]:
     """Every kind with every value to try.
 
     `x`, (n,), is the linear model's output less its bias; the denominator, by rising powers of s
-    per sample, is of the dynamics that a force acts on; `fs` is the rate in Hz. With `every` = 3,
-    the middle value of each three is tried.
+    per sample, is of the dynamics that a force acts on. With `fs` in Hz, speeds are per second.
+    With `every` = 3, the middle value of each three is tried.
     """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)

@@ -138,7 +138,7 @@ def kinds_in_question(
     for fit in starts:
         if best.cost < PART**2 * fit.cost:
             continue
-        seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
+        seen = bends(command.u, problem, fit, intersample=command.intersample)
         kinds = [one.kind for one in seen if one.certain]
         if fit.structure.name in _SERVOS:
             alike = any(kind in ALIKE for kind in kinds)

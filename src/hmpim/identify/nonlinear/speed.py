@@ -94,7 +94,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if start is not best:
         plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
     gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
-    others = bends(u, problem, plainly, intersample=start.intersample, fs=1.0)
+    others = bends(u, problem, plainly, intersample=start.intersample)
     if any(other.kind != "rate_limit" and other.gain > gained for other in others):
         return None
     return limited
