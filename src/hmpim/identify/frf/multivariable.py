@@ -99,14 +99,8 @@ def joint_response(
     The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output,
     (n,), follows them by a delay in s, not negative; a rough value suffices. Where it is not
     `valid`, (n,), it is taken from `fill`, (n,), a model's prediction with the bias. `names` are
-    those of the inputs, then of the output, for messages.
-
-    Raises
-    ------
-    RecordError
-        For inputs that are multiples or sums of others over the whole band: they are named.
-    ArgumentError
-        For an impossible band, or one with too few bins.
+    those of the inputs, then of the output, for messages. Inputs that are multiples or sums of
+    others over the whole band are refused, and so is a band with too few bins.
     """
     m, samples = inputs.shape
     check_band(band, fs)

@@ -58,13 +58,8 @@ def identify_statistics(
     """Identify one pair from compressed records.
 
     The input between its samples is the likeliest if it is not stated. Integrators are tried in any
-    case, and refused.
-
-    Raises
-    ------
-    RecordError
-        If the channels do not move, too few samples were read, or the memory is longer than the
-        window, as that of an integrator is.
+    case, and refused, as their memory is longer than any window; so are channels that do not move,
+    and too few samples.
     """
     _check_moves(statistics)
     data, joint = choose(statistics, intersample=intersample, structures=structures)
