@@ -200,7 +200,7 @@ def _software_fit(
     equations = _equations(u, y, valid)
     source, latest = prepare_input(u, "sampled"), u.size // 2
     problem = Problem(source=source, y=y, valid=valid, longest_delay=latest, nuisance=nuisance)
-    floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
+    floor = _ROUNDING**2 * problem.spread
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
     if first.cost > floor and equations.cost_of_all <= floor:

@@ -24,8 +24,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted
     """
     fit = min(fits, key=lambda f: f.objective)
     problem = data.problem(mode, seen)
-    spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost < PART * float(spread @ spread):
+    if fit.cost < PART * problem.spread:
         return None
     noise = autoregression(fit.residual, seen.valid)
     if noise.size == 1:
