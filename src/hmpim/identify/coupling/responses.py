@@ -1,7 +1,7 @@
 """Several inputs at once: measured response to each, and findings on weak or similar inputs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
 from typing import Any
@@ -359,21 +359,17 @@ def _determined(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, l
         (uncertain, ("peak_gain_db",)),
         (late, ("delay", "delay_low_frequency")),
     )
-    known = {name: getattr(p, name) for _, names in tests for name in names}
-    gone = {n for bad, names in tests for n in names if known[n] is not None and bad(known[n])}
+    known = p.given
+    gone = {n for bad, names in tests for n in names if n in known and bad(known[n])}
     if "natural_frequency" in gone:
         gone |= {"damping_ratio", "peak_gain_db"}
     if "scale_factor" in gone:
         gone |= set(_WITH_GAIN) | {"delay_low_frequency", "delay_correlation"}
-    unknown = [name for name in _WITH_GAIN if name in gone and getattr(p, name) is not None]
+    unknown = [name for name in _WITH_GAIN if name in gone and name in known]
     return replace(p, **dict.fromkeys(gone, None)), unknown
 
 
 def _finite(p: Parameters) -> Parameters:
     """The parameters without those whose error is not finite."""
-    bad = [
-        f.name
-        for f in fields(p)
-        if (e := getattr(p, f.name)) is not None and not np.isfinite(e.spread)
-    ]
+    bad = [name for name, e in p.given.items() if not np.isfinite(e.spread)]
     return replace(p, **dict.fromkeys(bad, None))
