@@ -24,20 +24,18 @@ from hmpim.identify.nonlinear.harmonic_regression import (
     view_of,
 )
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
+from hmpim.identify.result import HarmonicCurve
 
 __all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Harmonic:
-    """One order; amplitudes are in the residual's unit."""
+    """One order."""
 
-    order: int  # multiple of the sweep's frequency
-    rms: float  # over the sweep, without the noise
+    curve: HarmonicCurve  # along the sweep, at places that the order reaches
+    rms: float  # over the sweep, without the noise, in the residual's unit
     probability: float  # chance that noise alone produces as much or more
-    frequency: tuple[float, ...]  # Hz, of the sweep itself, at places that the order reaches
-    amplitude: tuple[float, ...]  # of the harmonic at these places
-    std: tuple[float, ...]  # standard deviation of the amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,11 +49,11 @@ class Harmonics:
 
     def rms(self, parity: int) -> float:
         """R.m.s. of all even (0) or odd (1) orders together."""
-        return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.order % 2 == parity)))
+        return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.curve.order % 2 == parity)))
 
     def probability(self, parity: int) -> float:
         """Chance that noise makes the even (0) or odd (1) orders, corrected for their number."""
-        chances = [h.probability for h in self.orders if h.order % 2 == parity]
+        chances = [h.probability for h in self.orders if h.curve.order % 2 == parity]
         return min(1.0, len(chances) * min(chances, default=1.0))
 
 
@@ -126,16 +124,14 @@ def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
         reached = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
         spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
         chance = scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
-        found.append(
-            Harmonic(
-                order=k,
-                rms=float(np.sqrt(power)),
-                probability=float(chance),
-                frequency=tuple(frequency[reached].tolist()),
-                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
-                std=tuple(np.sqrt(spread[reached]).tolist()),
-            )
+        curve = HarmonicCurve(
+            order=k,
+            frequency=tuple(frequency[reached].tolist()),
+            amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
+            std=tuple(np.sqrt(spread[reached]).tolist()),
         )
+        rms = float(np.sqrt(power))
+        found.append(Harmonic(curve=curve, rms=rms, probability=float(chance)))
     degrees = max(fit.rest.size - int(np.count_nonzero(fit.used)), 1)
     return Harmonics(
         orders=tuple(found[1:]),

@@ -212,10 +212,8 @@ def _summary(
     if (harmonics := outcome.harmonics) is not None:
         even, odd = (harmonics.rms(p) / output for p in (0, 1))
         model = thinned(outcome.fit.prediction, subject.block)
-        curves = [_own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)]
-        for h in harmonics.orders:
-            parts = {"frequency": h.frequency, "amplitude": h.amplitude, "std": h.std}
-            curves.append(HarmonicCurve(order=h.order, **parts))
+        own = _own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)
+        curves = [own, *(harmonic.curve for harmonic in harmonics.orders)]
     elif outcome.mechanisms:
         share = outcome.mechanisms[0].rms / output
         even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)
