@@ -81,16 +81,29 @@ def each(u: np.ndarray, y: np.ndarray, **options: Any) -> list[JointResponse]:
     return [alone(u, own, axis[2], **options) for own, axis in zip(y, DIRECT, strict=True)]
 
 
-def errors_of(found: list[JointResponse]) -> list[np.ndarray]:
-    return [np.abs(one.response - true_response(one.frequency, i)) for i, one in enumerate(found)]
+def usable(found: JointResponse) -> float:
+    """Share of the frequencies at which the inputs are separated."""
+    return found.inputs[0].frequency.size / found.frequency.size
+
+
+def together(found: JointResponse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frequency, and the responses to all inputs with their errors, (f, m)."""
+    response = np.stack([r.response for r in found.inputs], axis=1)
+    std = np.stack([r.std for r in found.inputs], axis=1)
+    return found.inputs[0].frequency, response, std
+
+
+def errors(found: JointResponse, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of the responses of one axis, and what they are stated to be."""
+    frequency, response, std = together(found)
+    return np.abs(response - true_response(frequency, i)), std
 
 
 def measured(
     three_axes: tuple[np.ndarray, np.ndarray], noise: float, seed: int
-) -> tuple[list[JointResponse], list[np.ndarray]]:
+) -> list[JointResponse]:
     u, clean = three_axes
-    found = each(u, clean + noise * np.random.default_rng(seed).standard_normal(clean.shape))
-    return found, errors_of(found)
+    return each(u, clean + noise * np.random.default_rng(seed).standard_normal(clean.shape))
 
 
 def off(i: int) -> np.ndarray:
@@ -100,20 +113,21 @@ def off(i: int) -> np.ndarray:
 def test_couplings_of_three_axes_are_within_half_a_percent_of_the_direct_gain(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    errors = []
+    coupled = []
     for seed in range(5):
-        for i, (found, error) in enumerate(zip(*measured(three_axes, 0.01, seed), strict=True)):
-            assert found.usable.mean() > 0.9
-            errors.append(error[found.usable][:, off(i)].ravel())
-    assert np.mean(np.concatenate(errors) < 0.005) > 0.995
+        for i, found in enumerate(measured(three_axes, 0.01, seed)):
+            assert usable(found) > 0.9
+            coupled.append(errors(found, i)[0][:, off(i)].ravel())
+    assert np.mean(np.concatenate(coupled) < 0.005) > 0.995
 
 
 def test_without_noise_couplings_are_nearly_exact(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    for i, (found, error) in enumerate(zip(*measured(three_axes, 0.0, 0), strict=True)):
-        assert np.median(error[found.usable][:, off(i)]) < 3e-4
-        assert error[found.usable].max() < 0.003
+    for i, found in enumerate(measured(three_axes, 0.0, 0)):
+        error, _ = errors(found, i)
+        assert np.median(error[:, off(i)]) < 3e-4
+        assert error.max() < 0.003
 
 
 @pytest.mark.parametrize("noise", [0.1, *in_studies(0.01)])
@@ -122,10 +136,10 @@ def test_stated_errors_agree_with_the_scatter(
 ) -> None:
     parts: dict[bool, list[tuple[np.ndarray, np.ndarray]]] = {True: [], False: []}
     for seed in range(max(seeds // 10, 5)):
-        for i, (found, error) in enumerate(zip(*measured(three_axes, noise, seed), strict=True)):
+        for i, found in enumerate(measured(three_axes, noise, seed)):
+            error, std = errors(found, i)
             for coupled, part in ((True, off(i)), (False, ~off(i))):
-                here = np.ix_(found.usable, part)
-                parts[coupled].append((error[here].ravel(), found.std[here].ravel()))
+                parts[coupled].append((error[:, part].ravel(), std[:, part].ravel()))
     for pairs in parts.values():
         error, std = (np.concatenate(values) for values in zip(*pairs, strict=True))
         ratio = np.sqrt(np.mean(error**2) / np.mean(std**2))
@@ -142,9 +156,10 @@ def test_coherences_say_what_drives_what(three_axes: tuple[np.ndarray, np.ndarra
     for found in (all_of_them, one_of_them):
         assert found.multiple_coherence[found.frequency < 15].min() > 0.98
     assert np.median(none.multiple_coherence) < 0.1
-    assert all_of_them.partial_coherence[all_of_them.frequency < 15, 0].min() > 0.98
-    assert np.median(one_of_them.partial_coherence[:, 0]) < 0.1
-    assert np.median(one_of_them.partial_coherence[:, 1]) > 0.98
+    own = all_of_them.inputs[0]
+    assert own.coherence[own.frequency < 15].min() > 0.98
+    assert np.median(one_of_them.inputs[0].coherence) < 0.1
+    assert np.median(one_of_them.inputs[1].coherence) > 0.98
 
 
 def test_one_input_gives_what_the_single_estimate_gives(
@@ -152,13 +167,14 @@ def test_one_input_gives_what_the_single_estimate_gives(
 ) -> None:
     u = three_axes[0][0]
     y = through(UP, *DIRECT[0]) + 0.01 * np.random.default_rng(0).standard_normal(N)
-    many = alone(u[None], y, 0.15)
+    found = alone(u[None], y, 0.15)
+    (many,) = found.inputs
     one = local_response(u, y, FS, band=BAND, delay=0.15)
     np.testing.assert_allclose(many.frequency, one.frequency)
-    apart = np.abs(many.response[:, 0] - one.response)
-    assert np.all(apart < 4 * np.hypot(many.std[:, 0], one.std))
+    apart = np.abs(many.response - one.response)
+    assert np.all(apart < 4 * np.hypot(many.std, one.std))
     assert np.median(apart) < np.median(one.std)
-    assert many.usable.all()
+    assert usable(found) == 1.0
 
 
 def test_units_and_order_of_the_channels_do_not_matter(
@@ -167,11 +183,12 @@ def test_units_and_order_of_the_channels_do_not_matter(
     u, clean = three_axes
     y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
     scale_u, scale_y = np.array([1.0, 50.0, 0.02]), np.array([1e3, 1.0, 1e-3])
-    other = each((u * scale_u[:, None])[::-1], y * scale_y[:, None])
-    for one, two, size in zip(each(u, y), other, scale_y, strict=True):
-        back = two.response[:, ::-1] * scale_u / size
-        np.testing.assert_allclose(back, one.response, rtol=1e-4, atol=1e-6)
-        np.testing.assert_array_equal(two.usable, one.usable)
+    turned = each((u * scale_u[:, None])[::-1], y * scale_y[:, None])
+    for one, two, size in zip(each(u, y), turned, scale_y, strict=True):
+        (frequency, response, _), (same, other, _) = together(one), together(two)
+        np.testing.assert_array_equal(same, frequency)
+        back = other[:, ::-1] * scale_u / size
+        np.testing.assert_allclose(back, response, rtol=1e-4, atol=1e-6)
 
 
 def test_inputs_alike_in_part_of_the_band_are_refused_there() -> None:
@@ -188,13 +205,11 @@ def test_inputs_alike_in_part_of_the_band_are_refused_there() -> None:
     u = np.stack((one, other))
     y = np.array([1.0, 0.3]) @ u + 0.01 * rng.standard_normal(N)
     found = alone(u, y, band=(0.5, 19.0))
-    low, high = found.frequency < 8, found.frequency > 12
-    assert not found.usable[low].any()
-    assert found.usable[high].mean() > 0.9
-    assert np.all(np.isnan(found.response[~found.usable]))
-    assert np.all(np.isnan(found.std[~found.usable]))
-    error = np.abs(found.response[found.usable] - [1.0, 0.3])
-    assert np.mean(error < 3 * found.std[found.usable]) > 0.95
+    frequency, response, std = together(found)
+    assert frequency.min() > 8
+    assert np.mean(np.isin(found.frequency[found.frequency > 12], frequency)) > 0.9
+    error = np.abs(response - [1.0, 0.3])
+    assert np.mean(error < 3 * std) > 0.95
 
 
 @pytest.mark.parametrize("factor", [1.0, -3.0])
@@ -227,7 +242,7 @@ def test_gaps_cost_accuracy_and_the_error_says_so(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
     u, clean = three_axes
-    errors, stds, whole = [], [], []
+    wrong, stds, whole = [], [], []
     for seed in range(4):
         rng = np.random.default_rng(seed)
         valid = np.ones(N, dtype=bool)
@@ -237,12 +252,13 @@ def test_gaps_cost_accuracy_and_the_error_says_so(
         for i, axis in enumerate(DIRECT):
             broken = np.where(valid, y[i], 99.0)
             found = alone(u, broken, axis[2], valid=valid, fill=clean[i])
-            kept = found.usable & (found.frequency < 8.0)
-            truth = true_response(found.frequency, i)
-            errors.append(np.abs(found.response - truth)[kept])
-            stds.append(found.std[kept])
-            whole.append(alone(u, y[i], axis[2]).std[kept])
-    error, std = np.concatenate(errors), np.concatenate(stds)
+            error, std = errors(found, i)
+            kept = found.inputs[0].frequency < 8.0
+            wrong.append(error[kept])
+            stds.append(std[kept])
+            frequency, _, std = together(alone(u, y[i], axis[2]))
+            whole.append(std[frequency < 8.0])
+    error, std = np.concatenate(wrong), np.concatenate(stds)
     assert np.mean(error < 2 * std) > 0.9
     assert np.sqrt(np.mean(error**2)) < 1.5 * np.sqrt(np.mean(std**2))
     assert np.median(std) > np.median(np.concatenate(whole))

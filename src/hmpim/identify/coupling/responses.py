@@ -155,12 +155,12 @@ def _pieces(
 
 def _column(pieces: list[tuple[list[int], JointResponse]], j: int) -> FrequencyResponse:
     """One input's response at the frequencies where the inputs are distinguished."""
-    own = [(m, (m.usable, active.index(j))) for active, m in pieces if j in active]
+    parts = [piece.inputs[active.index(j)] for active, piece in pieces if j in active]
     return FrequencyResponse(
-        frequency=_joined([m.frequency[m.usable] for m, _ in own]),
-        response=np.asarray(_joined([m.response[at] for m, at in own]), dtype=np.complex128),
-        std=_joined([m.std[at] for m, at in own]),
-        coherence=_joined([m.partial_coherence[at] for m, at in own]),
+        frequency=_joined([part.frequency for part in parts]),
+        response=np.asarray(_joined([part.response for part in parts]), dtype=np.complex128),
+        std=_joined([part.std for part in parts]),
+        coherence=_joined([part.coherence for part in parts if part.coherence is not None]),
     )
 
 

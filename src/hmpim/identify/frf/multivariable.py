@@ -36,6 +36,7 @@ from hmpim.identify.frf.rational import (
     read_off,
     solved,
 )
+from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import bins_in, check_band
 from hmpim.identify.worth import PART
 
@@ -63,15 +64,13 @@ _FEWEST = 16
 class JointResponse:
     """Frequency responses of one output to m inputs, measured at once."""
 
+    # of each input, at the frequencies where the inputs can be separated. The coherence is partial:
+    # the share that the input explains of the residual of the others, less that of noise
+    inputs: tuple[FrequencyResponse, ...]
     frequency: Real  # (f,): Hz
-    response: Complex  # (f, m): output over input, delay included; NaN where not `usable`
-    std: Real  # (f, m): √E|error|²; NaN where not `usable`
-    usable: Mask  # (f,): whether the inputs can be separated
     # (f,): share of the output's power in the window that all inputs together explain, less the
     # share of noise that as many coefficients explain
     multiple_coherence: Real
-    # (f, m): share that one input explains of the residual of the others, likewise
-    partial_coherence: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,15 +122,18 @@ def joint_response(
     response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
     # Filled samples have no residual and add no information: both raise the error.
     std = np.sqrt(variance) / share
-    response[~usable] = complex(np.nan, np.nan)
-    std[~usable] = np.nan
     return JointResponse(
+        inputs=tuple(
+            FrequencyResponse(
+                frequency=frequency[usable],
+                response=response[usable, j],
+                std=std[usable, j],
+                coherence=coherence[usable, j],
+            )
+            for j in range(m)
+        ),
         frequency=frequency,
-        response=response,
-        std=std,
-        usable=usable,
         multiple_coherence=coherence[:, -1],
-        partial_coherence=coherence[:, :-1],
     )
 
 
