@@ -16,6 +16,7 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.sampled import companion
 
 __all__ = ["at_ends", "in_whole_samples", "kept_in_sample", "steps_through"]
 
@@ -92,10 +93,5 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
 
 def _steps(below: Real, time: float) -> tuple[Real, Real]:
     """e^{At} and Γ(t) of a companion form, `below` by rising powers of s per sample."""
-    order = below.size - 1
-    matrix = np.zeros((order + 1, order + 1))
-    matrix[np.arange(order - 1), np.arange(1, order)] = 1.0
-    matrix[order - 1, :order] = -below[:-1] / below[-1]
-    matrix[order - 1, order] = 1.0 / below[-1]
-    step = scipy.linalg.expm(matrix * time)
-    return step[:order, :order], step[:order, order]
+    step = scipy.linalg.expm(companion(below, 1) * time)
+    return step[:-1, :-1], step[:-1, -1]
