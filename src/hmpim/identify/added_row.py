@@ -20,7 +20,6 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.nonlinear.mechanisms import Kind
 from hmpim.identify.nonlinear.modelled import (
     ALIKE,
     described,
@@ -34,6 +33,7 @@ from hmpim.identify.nonlinear.modelled import (
 from hmpim.identify.nonlinear.rows import Command, NonlinearRow, with_row
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import FEW, TWICE
+from hmpim.model.nonlinear import Kind
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]

@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.trial import schwarz
-from hmpim.identify.fleets.fleet import (
-    Column,
-    Fleet,
-    FleetFit,
-    Group,
-    fit_fleet,
-    parameters_of,
-    widen,
-)
-from hmpim.identify.fleets.learnt import is_alike, theta_at
+from hmpim.identify.fleets.fleet import Column, FleetFit, Group, fit_fleet, parameters_of, widen
+from hmpim.identify.fleets.learnt import Fleet, is_alike, theta_at
 from hmpim.identify.fleets.pole import alone_of
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler

@@ -28,11 +28,11 @@ from hmpim.identify.nonlinear.mechanisms import (
     LONGEST_AUTOREGRESSION,
     RATES,
     Hypothesis,
-    Kind,
     hypotheses,
     stretch_of,
 )
 from hmpim.identify.worth import MATERIAL, PART, WORTH
+from hmpim.model.nonlinear import Kind
 from hmpim.model.operators import rate_limited
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input

@@ -34,17 +34,15 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.nonlinear.harmonic_regression import HarmonicFit
-from hmpim.model.nonlinear import KIND_WORDS, Kind
+from hmpim.model.nonlinear import Kind
 from hmpim.model.operators import play, pushed, rate_limited, reversals
 
 __all__ = [
     "GAPS",
-    "KIND_WORDS",
     "LONGEST",
     "LONGEST_AUTOREGRESSION",
     "RATES",
     "Hypothesis",
-    "Kind",
     "Mechanism",
     "compare_harmonics",
     "compare_mechanisms",

@@ -19,7 +19,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.mechanisms import LONGEST, Kind
+from hmpim.identify.nonlinear.mechanisms import LONGEST
 from hmpim.identify.nonlinear.rows import (
     TURNS,
     Command,
@@ -34,7 +34,7 @@ from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
 from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, StructureName
-from hmpim.model.nonlinear import NonlinearPart
+from hmpim.model.nonlinear import Kind, NonlinearPart
 from hmpim.record import Finding
 
 __all__ = [

@@ -17,13 +17,14 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.nonlinear.evidence import Outcome, Subject, criterion_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Mechanism
+from hmpim.identify.nonlinear.mechanisms import LONGEST, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.result import HarmonicCurve, Nonlinearity
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import MATERIAL, MOST, WORTH
+from hmpim.model.nonlinear import KIND_WORDS
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "inspect_nonlinearity"]

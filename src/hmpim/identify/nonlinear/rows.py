@@ -27,12 +27,12 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
+from hmpim.identify.nonlinear.mechanisms import GAPS
 from hmpim.identify.worth import FEW, MATERIAL, PART
 from hmpim.model.dynamics import StructureName, coefficients_of
 from hmpim.model.fine import FINE, finely, joined, sampled
 from hmpim.model.friction import Rubbing, rubbed
-from hmpim.model.nonlinear import Place
+from hmpim.model.nonlinear import Kind, Place
 from hmpim.model.operators import gap_crossed, play, power_of, pushed
 from hmpim.model.response import per_step
 from hmpim.model.sampled import prepare_input
