@@ -17,7 +17,8 @@ import numpy as np
 
 import hmpim
 from hmpim.identify import excited_band
-from hmpim.identify.fleets.fleet import fit_fleet, learn_fleet
+from hmpim.identify.fleets.fleet import fit_fleet
+from hmpim.identify.fleets.learnt import learn_fleet
 from hmpim.identify.fleets.whole import learn_whole, whole_pairs
 from hmpim.identify.kept import keeping
 from hmpim.identify.threads import one_thread

@@ -17,7 +17,7 @@ from rich.progress import track
 from scipy.signal import lfilter
 
 import hmpim
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS
+from hmpim.model.nonlinear import KIND_WORDS
 from hmpim.model.operators import play, rate_limited
 
 FS = 200.0

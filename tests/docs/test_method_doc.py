@@ -11,8 +11,8 @@ import pytest
 
 from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.identify import identify_output
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS
 from hmpim.identify.result import groups
+from hmpim.model.nonlinear import KIND_WORDS
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")

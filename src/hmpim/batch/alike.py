@@ -24,7 +24,8 @@ from hmpim.batch.request import Request
 from hmpim.batch.rows import Row, fleet_table, rows_of
 from hmpim.batch.samples import Samples
 from hmpim.identify import Identification, PairIdentification, excited_band
-from hmpim.identify.fleets.fleet import Fleet, fit_fleet, learn_fleet
+from hmpim.identify.fleets.fleet import fit_fleet
+from hmpim.identify.fleets.learnt import Fleet, learn_fleet
 from hmpim.identify.fleets.whole import Whole, learn_whole, whole_pairs
 from hmpim.identify.kept import keeping
 from hmpim.identify.result import RecordSummary

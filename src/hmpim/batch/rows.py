@@ -12,7 +12,8 @@ import numpy as np
 from hmpim.batch.addresses import Address
 from hmpim.batch.reading import Read
 from hmpim.identify import Estimate, Identification, Parameters
-from hmpim.identify.fleets.fleet import Fleet, FleetFit
+from hmpim.identify.fleets.fleet import FleetFit
+from hmpim.identify.fleets.learnt import Fleet
 from hmpim.record import Record
 
 __all__ = [

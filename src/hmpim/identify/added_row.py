@@ -20,25 +20,25 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.nonlinear.mechanisms import Kind
 from hmpim.identify.nonlinear.modelled import (
     ALIKE,
     described,
     is_explained,
-    is_noise,
+    is_rounding,
     kinds_in_question,
     leaves_noise,
     linear_starts,
     settled_rows,
 )
-from hmpim.identify.nonlinear.rows import Command, Nonlinearity, with_row
+from hmpim.identify.nonlinear.rows import Command, NonlinearRow, with_row
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import FEW, TWICE
+from hmpim.model.nonlinear import Kind
 from hmpim.record import Intersample
 
 __all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
 
-_Found = tuple[float, Nonlinearity, JointFit, OutputFit]
+_Found = tuple[float, NonlinearRow, JointFit, OutputFit]
 """Gain in Schwarz's criterion by a row, the row, the fit with it, and the fit without it."""
 
 
@@ -114,7 +114,7 @@ def _alone(question: Question, i: int, y: Real) -> Question:
     )
 
 
-def _counting(question: Question, one: Nonlinearity) -> Question:
+def _counting(question: Question, one: NonlinearRow) -> Question:
     """The same question without samples of the output that do not count with a row."""
     if one.counts is None:
         return question
@@ -168,11 +168,11 @@ def _fit_beside(
     question: Question,
     seen: Imperfections,
     i: int,
-    one: Nonlinearity,
+    one: NonlinearRow,
     size: float,
     *,
     steadily: bool,
-) -> tuple[OutputFit, JointFit, Nonlinearity] | None:
+) -> tuple[OutputFit, JointFit, NonlinearRow] | None:
     """Fit all inputs to the output without a row of a size, and compute the row again from that.
 
     Without a drift and hum, if `steadily`. None if the output then does not follow input `i`.
@@ -191,8 +191,8 @@ def _moved_by_others(fitted: OutputFit, i: int) -> Real:
 
 
 def _joined(
-    fitted: OutputFit, i: int, one: Nonlinearity, trend: Real
-) -> tuple[JointFit, Nonlinearity]:
+    fitted: OutputFit, i: int, one: NonlinearRow, trend: Real
+) -> tuple[JointFit, NonlinearRow]:
     """The leading fit with the row, which is computed once more with this fit, and the row."""
     joint = fitted.fits[i]
     former, best = joint.best, joint.best.fit
@@ -236,7 +236,7 @@ def _with_rows(
     """
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     floor = seen.floor(question.output.values)
-    if question.exact or is_explained(source.values, joint, fs=question.aligned.fs, floor=floor):
+    if question.exact or is_explained(source.values, joint, floor=floor):
         return
     if fitted.gaining is not None and fitted.gaining.taken:
         return
@@ -287,7 +287,7 @@ def _plain(
 
 
 def _fitted_with(
-    question: Question, seen: Imperfections, problem: Problem, one: Nonlinearity
+    question: Question, seen: Imperfections, problem: Problem, one: NonlinearRow
 ) -> JointFit:
     """Fit every structure with a row for a nonlinearity."""
     question = _counting(question, one)
@@ -317,7 +317,7 @@ def _likeliest(
     former: Problem,
     count: int,
     rounding: float,
-) -> tuple[Nonlinearity | None, float]:
+) -> tuple[NonlinearRow | None, float]:
     """The row of a kind that gains most in Schwarz's criterion, if any does, and what it leaves.
 
     With the dynamics of its start, or, unless it acts within these, with those that lead. Of
@@ -325,7 +325,7 @@ def _likeliest(
     The second value is the power of the residual.
     """
     best, white = joint.best.fit, False
-    found: Nonlinearity | None = None
+    found: NonlinearRow | None = None
     lead, led = best, former  # the likeliest fit so far, and its data
     for start in starts:
         for one in settled_rows(kind, command, problem, start):
@@ -338,7 +338,7 @@ def _likeliest(
                 # Compared at samples that count in both: of friction, other samples may stick.
                 if criterion_gain(again, count if found is None else 0, lead, led) > 0.0:
                     found, lead, led = one, fit, data
-            if one.within is not None and is_noise(data, fit, rounding):
+            if one.within is not None and (fit.is_white or is_rounding(data, fit, rounding)):
                 break
         if white:
             break

@@ -38,17 +38,9 @@ _NORMAL = NormalDist()  # scipy.special would be a third of the time of `import 
 
 
 def deviations(questions: int = 1) -> float:
-    """Two-sided limit of a normal error, in standard deviations, at the rate of false alarms.
+    """Two-sided limit of so many normal errors at once, in standard deviations.
 
-    Parameters
-    ----------
-    questions : int
-        Number of errors that are tested at once.
-
-    Returns
-    -------
-    float
-        An error beyond it is not due to chance.
+    An error beyond it is due to chance at the rate of false alarms.
 
     Examples
     --------
@@ -66,12 +58,7 @@ EXCLUDED = DEVIATIONS**2
 
 
 def searched(alternatives: int) -> float:
-    """Log-likelihood that the best of many alternatives gains by chance as rarely.
-
-    Parameters
-    ----------
-    alternatives : int
-        How many are compared.
+    """Log-likelihood that the best of so many alternatives gains by chance as rarely.
 
     Examples
     --------

@@ -84,8 +84,6 @@ def kept(function: Callable[P, T], *, long: bool = False) -> Callable[P, T]:
         if known is None:
             return function(*args, **kwargs)
         key = _key(function, (*args, *kwargs.items()))
-        if key is None:
-            return function(*args, **kwargs)
         if key in known:
             known.move_to_end(key)
             return cast(T, known[key])
@@ -130,16 +128,14 @@ class Recent(OrderedDict[Hashable, Any]):
             self.popitem(last=False)
 
 
-def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable | None:
-    """Key of a call, by samples or for long arrays by address; None if an argument has none."""
+def _key(function: Callable[..., Any], values: tuple[Any, ...]) -> Hashable:
+    """Key of a call, by samples or for long arrays by address."""
     parts: list[Hashable] = [function]
     for value in values:
         if isinstance(value, np.ndarray):
             parts += [value.shape, value.dtype.char, _name_of(value)]
-        elif isinstance(value, Hashable):
-            parts.append(value)
         else:
-            return None
+            parts.append(value)
     return tuple(parts)
 
 

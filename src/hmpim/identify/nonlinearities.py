@@ -127,7 +127,6 @@ def looked_through(
         fit,
         plain,
         intersample=best.intersample,
-        fs=aligned.fs,
         floor=floor,
     )
     bent_instead, untried = attempt("bends", look_at_bends, False)
@@ -146,12 +145,12 @@ def possible_bends(
 
     Nor with several inputs, in a loop, or for software.
     """
-    best, fs = joint.best, question.aligned.fs
+    best = joint.best
     doubted = any(finding.severity == "doubt" for finding in said)
     alone = question.inputs is None and question.instrument is None
     if doubted or not alone or best.fit.structure.sampled:
         return ()
     u = question.aligned.inputs[i].values
     floor = found.floor(question.output.values)
-    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, fs=fs, floor=floor)
-    return (*own, *plainer_bends(u, joint, plain, fs=fs, floor=floor))
+    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, floor=floor)
+    return (*own, *plainer_bends(u, joint, plain, floor=floor))

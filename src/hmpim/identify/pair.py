@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from hmpim.identify.coupling.responses import (
 from hmpim.identify.effects.censored import CensoredFit
 from hmpim.identify.effects.drift import drift_findings
 from hmpim.identify.effects.findings import with_imperfections
-from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
 from hmpim.identify.fitting.fit import Fit
@@ -36,8 +36,6 @@ from hmpim.identify.nonlinearities import looked_through, possible_bends
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import response_through
 from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
-from hmpim.identify.reading.candidates import candidates_of
-from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
@@ -54,9 +52,8 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.worth import WORTH
-from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.response import response_std
-from hmpim.record import Finding
+from hmpim.record import Finding, Signal
 
 __all__ = ["Described", "describe", "describe_dead"]
 
@@ -75,7 +72,7 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
     if inputs is None:
         (source,) = aligned.inputs
         if fitted.fits[0].related:
-            pair = _pair(question, seen, fitted, 0, None)
+            pair = _pair(_Followed(question=question, found=seen, joined=fitted, i=0, matrix=None))
             if question.swapped is not None:
                 pair = replace(pair, warnings=(question.swapped, *pair.warnings))
             return Described(pairs=(pair,))
@@ -87,7 +84,9 @@ def describe(question: Question, seen: Imperfections, fitted: OutputFit) -> Desc
     pairs = []
     for i, source in enumerate(aligned.inputs):
         if fitted.fits[i].related:
-            pair = _pair(question, seen, fitted, i, responses)
+            pair = _pair(
+                _Followed(question=question, found=seen, joined=fitted, i=i, matrix=responses)
+            )
             pair = replace(pair, warnings=(*pair.warnings, *more))
             pairs.append(settled(pair, fitted, i, inputs, aligned.fs))
         else:
@@ -110,61 +109,91 @@ def describe_dead(question: Question) -> Described:
     return Described(pairs=tuple(_unrelated(question, i, finding) for i in every))
 
 
-def _pair(
-    question: Question, found: Imperfections, joined: OutputFit, i: int, matrix: Responses | None
-) -> PairIdentification:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Followed:
+    """An output and an input that it follows."""
+
+    question: Question
+    found: Imperfections
+    joined: OutputFit  # of the output to all inputs
+    i: int  # which input
+    matrix: Responses | None  # measured responses to all inputs; None with one input
+
+    @property
+    def source(self) -> Signal:
+        """The input."""
+        return self.question.aligned.inputs[self.i]
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Band in Hz that the input excites."""
+        return self.question.band(self.i)
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of input and output."""
+        return self.source.unit, self.question.output.unit
+
+    @property
+    def bending(self) -> Modelled | None:
+        """The nonlinearity that the model includes, other than a limited speed."""
+        return self.joined.bending_of(self.i)
+
+    def response_to(self, y: Real, fit: Fit) -> FrequencyResponse:
+        """Local response; that of an integrator from the output's differences.
+
+        An integrating output does not end where it began, and that step leaks into every bin.
+        """
+        u, fs, band = self.source.values, self.question.aligned.fs, self.band
+        delay = fit.delay / fs
+        if not fit.structure.integrators:
+            return local_response(u, y, fs, delay=delay, band=band)
+        steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
+        difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
+        response, std = steps.response / difference, steps.std / np.abs(difference)
+        return replace(steps, response=response, std=std)
+
+
+def _pair(own: _Followed) -> PairIdentification:
     """Describe an output that follows an input."""
-    aligned, output = question.aligned, question.output
-    source, band = aligned.inputs[i], question.band(i)
-    units, bending = (source.unit, output.unit), joined.bending_of(i)
-    joint, censored, covariance = _refined(question, found, joined, i)
+    question, joined, aligned = own.question, own.joined, own.question.aligned
+    output, units, bending = question.output, own.units, own.bending
+    joint, censored, covariance = _refined(own)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
-    joint, inspection, unseen = looked_through(question, found, joined, joint, i, plain)
+    joint, inspection, unseen = looked_through(question, own.found, joined, joint, own.i, plain)
     said = () if inspection is None else inspection.findings
-    command = source.values if question.limited is None else question.limited.recorded
-    y = output.values if matrix is None else joint.problem.y
-    paper = paper_estimates(command, y, aligned.fs, band=band)
+    command = own.source.values if question.limited is None else question.limited.recorded
+    y = output.values if own.matrix is None else joint.problem.y
+    paper = paper_estimates(command, y, aligned.fs, band=own.band)
     readings = read_parameters(
         joint,
         fs=aligned.fs,
-        highest=min(band[1], aligned.fs / 2),
+        highest=min(own.band[1], aligned.fs / 2),
         delay_correlation=paper.delay,
         known_covariance=covariance,
         units=units,
     )
-    response = (
-        _measured(question, found, joint, readings, i) if matrix is None else matrix.columns[i]
-    )
-    moves, unmoved = attempt(
-        "bends", lambda: possible_bends(question, found, joint, i, plain, said), ()
-    )
-    from_response, unread = attempt(
-        "response_bandwidths",
-        lambda: _bandwidths(question, joint, readings, response, i, matrix),
-        ResponseBandwidths(),
-    )
-    left, untested = attempt("misfit", lambda: _left(question, joint, i, matrix), Misfit())
-    evidence = _evidence(question, readings, joint, from_response, left, i, moves, joined)
-    evidence = replace(evidence, held=found.hold is not None)
+    response = _measured(own, joint, readings)
+    bent = partial(possible_bends, question, own.found, joint, own.i, plain, said)
+    moves, unmoved = attempt("bends", bent, ())
+    read = partial(_bandwidths, own, joint, readings, response)
+    from_response, unread = attempt("response_bandwidths", read, ResponseBandwidths())
+    left, untested = attempt("misfit", partial(_left, own, joint), Misfit())
+    evidence = _evidence(own, joint, readings, from_response, left, moves)
     if inspection is not None and said and bending is None:
-        bent = max(inspection.summary.nonlinear, evidence.nonlinear)
-        evidence = replace(evidence, nonlinear=bent)
-    parameters, seen = with_imperfections(evidence.spanned, found, censored, output.unit)
+        share = max(inspection.summary.nonlinear, evidence.nonlinear)
+        evidence = replace(evidence, nonlinear=share)
+    parameters, seen = with_imperfections(evidence.spanned, own.found, censored, output.unit)
     known = {finding.code for finding in seen}
-    findings = (
-        *_of_the_question(question, source.unit),
-        *judge(evidence),
-        *seen,
-        *(finding for finding in said if finding.code not in known),
-        *_of_the_model(question, joined, i, units, white=readings.white),
-        *(*unseen, *unmoved, *unread, *untested),
-    )
     fit, spread = joint.best.fit, _spread(joint)
     gaining, disturbance = joined.gaining, joined.disturbance
     course = None if gaining is None or not gaining.taken else gaining.course
-    numerator, denominator = coefficients_of(readings.system)
+    part = None if bending is None else bending.part
+    if question.limited is not None:
+        part = question.limited.part(aligned.fs)
+    numerator, denominator = readings.coefficients
     return PairIdentification(
-        input=source.name,
+        input=own.source.name,
         output=output.name,
         structure=fit.structure.name,
         intersample=joint.best.intersample,
@@ -174,23 +203,24 @@ def _pair(
         frequency_response=response,
         numerator=numerator,
         denominator=denominator,
-        candidates=candidates_of(joint, lambda one: float(fit_percent(one.cost, spread))),
-        warnings=(*aligned.findings, *findings),
+        candidates=joint.candidates(lambda one: float(fit_percent(one.cost, spread))),
+        warnings=(
+            *aligned.findings,
+            *_of_the_question(question, units[0]),
+            *judge(evidence),
+            *seen,
+            *(finding for finding in said if finding.code not in known),
+            *_of_the_model(own, white=readings.white),
+            *(*unseen, *unmoved, *unread, *untested),
+        ),
         from_response=evidence.measured,
         time=aligned.time,
         prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
         residual=fit.residual if course is None else fit.residual * course,
-        covariance=highest_first(readings.coefficient_covariance, readings.system),
+        covariance=readings.by_falling_powers,
         nonlinearity=None if inspection is None else _summary(inspection, bending, units),
-        nonlinear_part=_nonlinear_part(question, bending),
+        nonlinear_part=part,
     )
-
-
-def _nonlinear_part(question: Question, bending: Modelled | None) -> NonlinearPart | None:
-    """The nonlinearity that the model includes."""
-    if question.limited is not None:
-        return question.limited.part(question.aligned.fs)
-    return None if bending is None else bending.part
 
 
 def _summary(
@@ -200,7 +230,7 @@ def _summary(
     summary = inspection.summary
     if modelled is None:
         return summary
-    return replace(summary, kinds=(modelled.kind,), size=modelled.estimate(units))
+    return replace(summary, kinds=(modelled.part.kind,), size=modelled.estimate(units))
 
 
 def _of_the_question(question: Question, unit: str) -> Iterator[Finding]:
@@ -211,59 +241,63 @@ def _of_the_question(question: Question, unit: str) -> Iterator[Finding]:
         yield speed_finding(question.limited, question.aligned.fs, unit)
 
 
-def _of_the_model(
-    question: Question, joined: OutputFit, i: int, units: tuple[str, str], *, white: bool
-) -> Iterator[Finding]:
+def _of_the_model(own: _Followed, *, white: bool) -> Iterator[Finding]:
     """Findings about a drift, hum and a nonlinearity that the model includes."""
-    fs, bending = question.aligned.fs, joined.bending_of(i)
+    fs, joined, unit = own.question.aligned.fs, own.joined, own.units[1]
     if joined.drifting is not None:
-        yield from drift_findings(joined.drifting, fs, units[1], white=white)
+        yield from drift_findings(joined.drifting, fs, unit, white=white)
     if joined.humming is not None:
-        yield hum_finding(joined.humming, fs, units[1])
-    if bending is not None:
-        yield modelled_finding(bending, units)
+        yield hum_finding(joined.humming, fs, unit)
+    if own.bending is not None:
+        yield modelled_finding(own.bending, own.units)
 
 
 def _evidence(
-    question: Question,
-    readings: Readings,
+    own: _Followed,
     joint: JointFit,
+    readings: Readings,
     from_response: ResponseBandwidths,
     left: Misfit,
-    i: int,
     moves: tuple[Bend, ...],
-    joined: OutputFit,
 ) -> Evidence:
     """The evidence that the checks examine."""
-    fs, band, fit = question.aligned.fs, question.band(i), joint.best.fit
+    question, joined, fit = own.question, own.joined, joint.best.fit
+    fs, known = question.aligned.fs, question.measured
     # A change of the gain is not reported with a fit that a nonlinearity has replaced.
-    gaining = joined.gaining if fit is joined.fits[i].best.fit else None
-    known = question.measured
+    gaining = joined.gaining if fit is joined.fits[own.i].best.fit else None
     evidence = Evidence(
         joint=joint,
         readings=readings,
         spanned=readings.parameters,
         misfit=left,
-        u=question.aligned.inputs[i].values,
+        u=own.source.values,
         fs=fs,
-        band=band,
+        band=own.band,
         fit_percent=float(fit_percent(fit.cost, _spread(joint))),
         bends=moves,
         nonlinear=max((one.share for one in moves if one.certain), default=0.0),
         measured=from_response,
+        held=own.found.hold is not None,
         through=question.instrument is not None,
         filled=0 if known is None else int(np.count_nonzero(~known)),
         jittered=any(finding.code == "jitter" for finding in question.aligned.findings),
         limited=question.limited is not None,
         gaining=gaining,
     )
+    drifting = joined.drifting if own.i == joined.asked else None
+    others = [] if gaining is None else [*gaining.others]
+    if drifting is not None and drifting.rival is not None:
+        others.append(drifting.rival)
+    bending = joined.bending_of(own.i)
+    if bending is not None:
+        others.extend(bending.others.values())
     whole = spanned(
         readings.parameters,
         joint,
         fs=fs,
-        highest=min(band[1], fs / 2),
+        highest=min(own.band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
-        others=_other_explanations(gaining, joined, i),
+        others=others,
         owed=evidence.owed,
     )
     if any(one.matters for one in moves):
@@ -273,112 +307,79 @@ def _evidence(
     return replace(evidence, spanned=whole)
 
 
-def _left(question: Question, joint: JointFit, i: int, matrix: Responses | None) -> Misfit:
+def _left(own: _Followed, joint: JointFit) -> Misfit:
     """How much of the residual still follows the input."""
-    if matrix is not None:
-        return matrix.left()[i]
-    fs, (low, high), fit = question.aligned.fs, question.band(i), joint.best.fit
-    u = question.aligned.inputs[i].values
-    return misfit(u, fit.residual, delay=fit.delay, band=(low / fs, high / fs))
-
-
-def _other_explanations(gaining: GainChange | None, joined: OutputFit, i: int) -> list[Fit]:
-    """Alternative fits that the record cannot exclude: another gain, bias, or nonlinearity."""
-    others = [] if gaining is None else [*gaining.others]
-    drifting, bending = joined.drifting if i == joined.asked else None, joined.bending_of(i)
-    if bending is not None:
-        others.extend(bending.others.values())
-    if drifting is not None and drifting.rival is not None:
-        others.append(drifting.rival)
-    return others
+    if own.matrix is not None:
+        return own.matrix.left()[own.i]
+    fs, (low, high), fit = own.question.aligned.fs, own.band, joint.best.fit
+    return misfit(own.source.values, fit.residual, delay=fit.delay, band=(low / fs, high / fs))
 
 
 def _bandwidths(
-    question: Question,
-    joint: JointFit,
-    readings: Readings,
-    response: FrequencyResponse,
-    i: int,
-    matrix: Responses | None,
+    own: _Followed, joint: JointFit, readings: Readings, response: FrequencyResponse
 ) -> ResponseBandwidths:
     """Bandwidths of the measured response, less the estimator's bias if the model's differ.
 
     Between lines, and next to a notch of the input, a local fit is biased whatever the noise. The
     bias is that which it has when the record is the model's own output.
     """
-    fs, fit = question.aligned.fs, joint.best.fit
+    question, fit = own.question, joint.best.fit
 
     def read(seen: FrequencyResponse) -> ResponseBandwidths:
         return response_bandwidths(
             seen,
             readings.system,
             readings.parameters,
-            fs=fs,
+            fs=question.aligned.fs,
             intersample=joint.best.intersample,
         )
 
     found = read(response)
     if question.instrument is not None or not disagreeing(found, readings.parameters):
         return found
-    if matrix is None:
-        u = question.aligned.inputs[i].values
-        own = _local(u, fit.prediction, fit, fs, question.band(i))
+    if own.matrix is None:
+        of_model = own.response_to(fit.prediction, fit)
     else:
-        own = matrix.of_models()[i]
-    return less_bias(found, read(own), readings.parameters)
+        of_model = own.matrix.of_models()[own.i]
+    return less_bias(found, read(of_model), readings.parameters)
 
 
-def _refined(
-    question: Question, found: Imperfections, joined: OutputFit, i: int
-) -> tuple[JointFit, CensoredFit | None, Real | None]:
+def _refined(own: _Followed) -> tuple[JointFit, CensoredFit | None, Real | None]:
     """The fit with the likelihood of clipped and held samples, and its covariance if known."""
-    joint = joined.fits[i]
-    covariance = joined.covariances[i] if joined.covariances else None
+    question, joined = own.question, own.joined
+    joint = joined.fits[own.i]
+    covariance = joined.covariances[own.i] if joined.covariances else None
     software = joint.best.fit.structure.sampled  # it holds its output between samples
     if question.inputs is not None or question.instrument is not None or software:
         return joint, None, covariance
-    refined = refine(
-        joint, found, question.aligned.inputs[i].values, question.aligned.fs, joined.disturbance
-    )
+    u, fs = own.source.values, question.aligned.fs
+    refined = refine(joint, own.found, u, fs, joined.disturbance)
     if refined is None:
         return joint, None, covariance
     return *refined, refined[1].covariance
 
 
-def _measured(
-    question: Question, found: Imperfections, joint: JointFit, readings: Readings, i: int
-) -> FrequencyResponse:
+def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyResponse:
     """Local response; the model replaces samples that are not informative, and its error is added.
 
     Noise decides which samples near a level are clipped, so the others are not a fair selection.
     The model alone in their place would pull the response towards the level.
     """
-    u, fs, band = question.aligned.inputs[i].values, question.aligned.fs, question.band(i)
-    fit, y = joint.best.fit, joint.problem.y  # without the drift
+    if own.matrix is not None:
+        return own.matrix.columns[own.i]
+    question, fit, y = own.question, joint.best.fit, joint.problem.y  # without the drift
+    fs = question.aligned.fs
     if question.instrument is not None:
-        return response_through(question.instrument, y, fs, band=band)
-    counted = found.counting(np.asarray(question.output.valid), fs)
+        return response_through(question.instrument, y, fs, band=own.band)
+    counted = own.found.counting(np.asarray(question.output.valid), fs)
     if counted is None:
-        return _local(u, y, fit, fs, band)
-    response = _local(u, np.where(counted, y, fit.prediction + fit.residual), fit, fs, band)
+        return own.response_to(y, fit)
+    response = own.response_to(np.where(counted, y, fit.prediction + fit.residual), fit)
     covariance = readings.coefficient_covariance
     if not np.isfinite(covariance).all():
         return response
-    own = response_std(readings.system, covariance, response.frequency)
-    return replace(response, std=np.hypot(response.std, own))
-
-
-def _local(u: Real, y: Real, fit: Fit, fs: float, band: tuple[float, float]) -> FrequencyResponse:
-    """Local response; that of an integrator from the output's differences.
-
-    An integrating output does not end where it began, and that step leaks into every bin.
-    """
-    delay = fit.delay / fs
-    if not fit.structure.integrators:
-        return local_response(u, y, fs, delay=delay, band=band)
-    steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
-    difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
-    return replace(steps, response=steps.response / difference, std=steps.std / np.abs(difference))
+    model_std = response_std(readings.system, covariance, response.frequency)
+    return replace(response, std=np.hypot(response.std, model_std))
 
 
 def _spread(joint: JointFit) -> float:

@@ -118,7 +118,7 @@ def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) 
 
     def bent(problem: Problem, constant: Fit) -> float:
         u, between = aligned.inputs[0].values, joint.best.intersample
-        kinds = bends(u, problem, constant, intersample=between, fs=aligned.fs)
+        kinds = bends(u, problem, constant, intersample=between)
         return kinds[0].share if kinds else 0.0
 
     found = changing_gain(joint, with_rows, bent)

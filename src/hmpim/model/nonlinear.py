@@ -29,7 +29,7 @@ from hmpim.model.fine import FINE, finely, joined, sampled
 from hmpim.model.friction import Rubbing, rubbed
 from hmpim.model.operators import play, power_of, rate_limited
 from hmpim.model.response import RationalDelay, per_step
-from hmpim.model.sampled import SampledInput, prepare_input
+from hmpim.model.sampled import SampledInput, companion, prepare_input
 from hmpim.record import Intersample
 
 __all__ = [
@@ -310,12 +310,7 @@ def force_step(denominator: _Real) -> tuple[list[list[float]], list[float], list
     order = below.size - 1
     if not order:
         return [], [], []
-    rates = np.zeros((order + 2, order + 2))
-    rates[: order - 1, 1:order] = np.eye(order - 1)
-    rates[order - 1, :order] = -below[:-1] / below[-1]
-    rates[order - 1, order] = 1.0 / below[-1]
-    rates[order, order + 1] = 1.0
-    moved = scipy.linalg.expm(rates)[:order]
+    moved = scipy.linalg.expm(companion(below, 2))[:order]
     held, rising = moved[:, order], moved[:, order + 1]
     return moved[:, :order].tolist(), (held - rising).tolist(), rising.tolist()
 

@@ -31,6 +31,7 @@ __all__ = [
     "SAMPLES_ALONE",
     "WINDOW",
     "SampledInput",
+    "companion",
     "delayed_response",
     "interpolation_error",
     "prepare_input",
@@ -199,6 +200,19 @@ def spline_signs(degree: int) -> NDArray[np.float64]:
     return np.array([(-1.0) ** j * comb(degree + 1, j) for j in range(degree + 2)])
 
 
+def companion(denominator: NDArray[np.float64], chained: int) -> NDArray[np.float64]:
+    """State matrix of 1/A behind a chain of integrators, shape (n + chained, n + chained).
+
+    The first n states are the output of 1/A and its derivatives. The first of the chain drives
+    them, the last stands still. The denominator is by rising powers of s, (n + 1,).
+    """
+    n = denominator.size - 1
+    matrix = np.eye(n + chained, k=1)
+    matrix[n - 1, :n] = -denominator[:-1] / denominator[-1]
+    matrix[n - 1, n] = 1.0 / denominator[-1]
+    return matrix
+
+
 @lru_cache(maxsize=16)  # a fit asks for the same system several times in a row
 def _spline_taps(
     coefficients: tuple[float, ...], lag: float, degree: int
@@ -211,13 +225,8 @@ def _spline_taps(
     denominator = np.array(coefficients)
     n = denominator.size - 1
     taps = n + degree + 2
-    # States: n of the companion form, then t^p/p!, ..., t, 1 driving it.
-    size = n + degree + 1
-    matrix = np.zeros((size, size))
-    matrix[np.arange(size - 1), np.arange(1, size)] = 1.0
-    matrix[n - 1, :n] = -denominator[:-1] / denominator[-1]
-    matrix[n - 1, n] = 1.0 / denominator[-1]
-    start = np.zeros(size)
+    matrix = companion(denominator, degree + 1)  # t^p/p!, ..., t, 1 drive it
+    start = np.zeros(n + degree + 1)
     start[-1] = 1.0
     step, part = scipy.linalg.expm(np.stack([matrix, matrix * (1.0 - lag)]))
     truncated = np.zeros((taps, n))  # answers to t_+^p / p! at i - lag

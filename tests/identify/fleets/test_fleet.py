@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hmpim
-from hmpim.identify.fleets.fleet import fit_fleet, learn_fleet, parameters_of
-from hmpim.identify.fleets.learnt import box_around
+from hmpim.identify.fleets.fleet import fit_fleet, parameters_of
+from hmpim.identify.fleets.learnt import box_around, learn_fleet
 from hmpim.identify.fleets.surface import Surface, places_in
 from hmpim.identify.fleets.whole import learn_whole, whole_pairs
 

@@ -1,10 +1,12 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import signal
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.frf.local import local_response
-from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.frf.multivariable import JointResponse, joint_response
 from tests_support import in_studies
 
 FS, N, FINE = 200.0, 2000, 32
@@ -61,60 +63,88 @@ def three_axes() -> tuple[np.ndarray, np.ndarray]:
     return np.stack([drive[::FINE] for drive in drives]), np.stack(outputs)
 
 
-def true_matrix(f: np.ndarray) -> np.ndarray:
-    out = np.empty((f.size, 3, 3), dtype=complex)
-    for i in range(3):
-        for j in range(3):
-            out[:, i, j] = (
-                second_order(f, *DIRECT[i]) if i == j else COUPLING * second_order(f, *COUPLED[i])
-            )
-    return out
+def true_response(f: np.ndarray, i: int) -> np.ndarray:
+    """Response of one axis to each of the three, (f, 3)."""
+    rows = [COUPLING * second_order(f, *COUPLED[i]) for _ in range(3)]
+    rows[i] = second_order(f, *DIRECT[i])
+    return np.stack(rows, axis=1)
 
 
-DELAYS = np.array([[axis[2]] for axis in DIRECT])
-OFF = ~np.eye(3, dtype=bool)
+def alone(u: np.ndarray, y: np.ndarray, delay: float = 0.0, **options: Any) -> JointResponse:
+    names = [f"input {k}" for k in range(len(u))] + ["output"]
+    given = {"band": BAND, "valid": None, "fill": np.zeros(y.size), "names": names, **options}
+    return joint_response(u, y, FS, delay=delay, **given)
+
+
+def each(u: np.ndarray, y: np.ndarray, **options: Any) -> list[JointResponse]:
+    """The responses of all three axes."""
+    return [alone(u, own, axis[2], **options) for own, axis in zip(y, DIRECT, strict=True)]
+
+
+def usable(found: JointResponse) -> float:
+    """Share of the frequencies at which the inputs are separated."""
+    return found.inputs[0].frequency.size / found.frequency.size
+
+
+def together(found: JointResponse) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frequency, and the responses to all inputs with their errors, (f, m)."""
+    response = np.stack([r.response for r in found.inputs], axis=1)
+    std = np.stack([r.std for r in found.inputs], axis=1)
+    return found.inputs[0].frequency, response, std
+
+
+def errors(found: JointResponse, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of the responses of one axis, and what they are stated to be."""
+    frequency, response, std = together(found)
+    return np.abs(response - true_response(frequency, i)), std
 
 
 def measured(
     three_axes: tuple[np.ndarray, np.ndarray], noise: float, seed: int
-) -> tuple[ResponseMatrix, np.ndarray]:
+) -> list[JointResponse]:
     u, clean = three_axes
-    y = clean + noise * np.random.default_rng(seed).standard_normal(clean.shape)
-    found = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
-    return found, np.abs(found.response - true_matrix(found.frequency))
+    return each(u, clean + noise * np.random.default_rng(seed).standard_normal(clean.shape))
+
+
+def off(i: int) -> np.ndarray:
+    return np.arange(3) != i
 
 
 def test_couplings_of_three_axes_are_within_half_a_percent_of_the_direct_gain(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
+    coupled = []
     for seed in range(5):
-        found, error = measured(three_axes, 0.01, seed)
-        assert found.usable.mean() > 0.9
-        assert error[found.usable][:, OFF].max() < 0.005
+        for i, found in enumerate(measured(three_axes, 0.01, seed)):
+            assert usable(found) > 0.9
+            coupled.append(errors(found, i)[0][:, off(i)].ravel())
+    assert np.mean(np.concatenate(coupled) < 0.005) > 0.995
 
 
 def test_without_noise_couplings_are_nearly_exact(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    found, error = measured(three_axes, 0.0, 0)
-    assert np.median(error[found.usable][:, OFF]) < 3e-4
-    assert error[found.usable].max() < 0.003
+    for i, found in enumerate(measured(three_axes, 0.0, 0)):
+        error, _ = errors(found, i)
+        assert np.median(error[:, off(i)]) < 3e-4
+        assert error.max() < 0.003
 
 
 @pytest.mark.parametrize("noise", [0.1, *in_studies(0.01)])
 def test_stated_errors_agree_with_the_scatter(
     three_axes: tuple[np.ndarray, np.ndarray], noise: float, seeds: int
 ) -> None:
-    errors, stds = [], []
+    parts: dict[bool, list[tuple[np.ndarray, np.ndarray]]] = {True: [], False: []}
     for seed in range(max(seeds // 10, 5)):
-        found, error = measured(three_axes, noise, seed)
-        errors.append(error[found.usable])
-        stds.append(found.std[found.usable])
-    error, std = np.concatenate(errors), np.concatenate(stds)
-    for part in (OFF, ~OFF):
-        ratio = np.sqrt(np.mean(error[:, part] ** 2) / np.mean(std[:, part] ** 2))
+        for i, found in enumerate(measured(three_axes, noise, seed)):
+            error, std = errors(found, i)
+            for coupled, part in ((True, off(i)), (False, ~off(i))):
+                parts[coupled].append((error[:, part].ravel(), std[:, part].ravel()))
+    for pairs in parts.values():
+        error, std = (np.concatenate(values) for values in zip(*pairs, strict=True))
+        ratio = np.sqrt(np.mean(error**2) / np.mean(std**2))
         assert ratio == pytest.approx(1, abs=0.15)
-    assert np.mean(error < 2 * std) > 0.94
+        assert np.mean(error < 2 * std) > 0.94
 
 
 def test_coherences_say_what_drives_what(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
@@ -122,13 +152,14 @@ def test_coherences_say_what_drives_what(three_axes: tuple[np.ndarray, np.ndarra
     y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
     y[2] = np.random.default_rng(1).standard_normal(N)  # an output that follows nothing
     y[1] = through(DOWN, *DIRECT[1]) + 0.01 * np.random.default_rng(2).standard_normal(N)
-    found = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
-    inside = found.frequency < 15
-    assert found.multiple_coherence[inside, :2].min() > 0.98
-    assert np.median(found.multiple_coherence[:, 2]) < 0.1
-    assert found.partial_coherence[inside, 0, 0].min() > 0.98
-    assert np.median(found.partial_coherence[:, 1, 0]) < 0.1
-    assert np.median(found.partial_coherence[:, 1, 1]) > 0.98
+    all_of_them, one_of_them, none = each(u, y)
+    for found in (all_of_them, one_of_them):
+        assert found.multiple_coherence[found.frequency < 15].min() > 0.98
+    assert np.median(none.multiple_coherence) < 0.1
+    own = all_of_them.inputs[0]
+    assert own.coherence[own.frequency < 15].min() > 0.98
+    assert np.median(one_of_them.inputs[0].coherence) < 0.1
+    assert np.median(one_of_them.inputs[1].coherence) > 0.98
 
 
 def test_one_input_gives_what_the_single_estimate_gives(
@@ -136,13 +167,14 @@ def test_one_input_gives_what_the_single_estimate_gives(
 ) -> None:
     u = three_axes[0][0]
     y = through(UP, *DIRECT[0]) + 0.01 * np.random.default_rng(0).standard_normal(N)
-    many = response_matrix(u[None], y[None], FS, delays=0.15, band=BAND)
+    found = alone(u[None], y, 0.15)
+    (many,) = found.inputs
     one = local_response(u, y, FS, band=BAND, delay=0.15)
     np.testing.assert_allclose(many.frequency, one.frequency)
-    apart = np.abs(many.response[:, 0, 0] - one.response)
-    assert np.all(apart < 4 * np.hypot(many.std[:, 0, 0], one.std))
+    apart = np.abs(many.response - one.response)
+    assert np.all(apart < 4 * np.hypot(many.std, one.std))
     assert np.median(apart) < np.median(one.std)
-    np.testing.assert_allclose(many.condition, 1.0)
+    assert usable(found) == 1.0
 
 
 def test_units_and_order_of_the_channels_do_not_matter(
@@ -151,17 +183,12 @@ def test_units_and_order_of_the_channels_do_not_matter(
     u, clean = three_axes
     y = clean + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
     scale_u, scale_y = np.array([1.0, 50.0, 0.02]), np.array([1e3, 1.0, 1e-3])
-    one = response_matrix(u, y, FS, delays=DELAYS, band=BAND)
-    other = response_matrix(
-        (u * scale_u[:, None])[::-1],
-        (y * scale_y[:, None])[::-1],
-        FS,
-        delays=DELAYS[::-1],
-        band=BAND,
-    )
-    back = other.response[:, ::-1, ::-1] * scale_u / scale_y[:, None]
-    np.testing.assert_allclose(back, one.response, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(other.condition, one.condition, rtol=1e-3)
+    turned = each((u * scale_u[:, None])[::-1], y * scale_y[:, None])
+    for one, two, size in zip(each(u, y), turned, scale_y, strict=True):
+        (frequency, response, _), (same, other, _) = together(one), together(two)
+        np.testing.assert_array_equal(same, frequency)
+        back = other[:, ::-1] * scale_u / size
+        np.testing.assert_allclose(back, response, rtol=1e-4, atol=1e-6)
 
 
 def test_inputs_alike_in_part_of_the_band_are_refused_there() -> None:
@@ -176,15 +203,13 @@ def test_inputs_alike_in_part_of_the_band_are_refused_there() -> None:
     )
     other = other + np.where(t >= 5, late, 0.0)
     u = np.stack((one, other))
-    y = np.array([[1.0, 0.3]]) @ u + 0.01 * rng.standard_normal((1, N))
-    found = response_matrix(u, y, FS, band=(0.5, 19.0))
-    low, high = found.frequency < 8, found.frequency > 12
-    assert not found.usable[low].any()
-    assert found.usable[high].mean() > 0.9
-    assert np.all(np.isnan(found.response[~found.usable]))
-    assert np.all(np.isnan(found.std[~found.usable]))
-    error = np.abs(found.response[found.usable][:, 0] - [1.0, 0.3])
-    assert np.mean(error < 3 * found.std[found.usable][:, 0]) > 0.95
+    y = np.array([1.0, 0.3]) @ u + 0.01 * rng.standard_normal(N)
+    found = alone(u, y, band=(0.5, 19.0))
+    frequency, response, std = together(found)
+    assert frequency.min() > 8
+    assert np.mean(np.isin(found.frequency[found.frequency > 12], frequency)) > 0.9
+    error = np.abs(response - [1.0, 0.3])
+    assert np.mean(error < 3 * std) > 0.95
 
 
 @pytest.mark.parametrize("factor", [1.0, -3.0])
@@ -192,10 +217,10 @@ def test_inputs_that_are_the_same_are_named(factor: float) -> None:
     u = np.stack((UP[::FINE], DOWN[::FINE], factor * UP[::FINE]))
     names = ("roll", "pitch", "yaw", "y")
     with pytest.raises(RecordError, match=r"^roll, yaw move alike over the whole band"):
-        response_matrix(u, u[:1], FS, band=BAND, names=names)
+        alone(u, u[0], names=names)
     total = np.stack((u[0], u[1], u[0] + u[1]))
     with pytest.raises(RecordError, match=r"^roll, pitch, yaw move alike"):
-        response_matrix(total, u[:1], FS, band=BAND, names=names)
+        alone(total, u[0], names=names)
 
 
 U = np.stack((UP[::FINE], DOWN[::FINE]))
@@ -210,28 +235,30 @@ U = np.stack((UP[::FINE], DOWN[::FINE]))
 )
 def test_bad_bands_are_refused(band: tuple[float, float], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
-        response_matrix(U, U, FS, band=band)
+        alone(U, U[0], band=band)
 
 
 def test_gaps_cost_accuracy_and_the_error_says_so(
     three_axes: tuple[np.ndarray, np.ndarray],
 ) -> None:
     u, clean = three_axes
-    errors, stds, whole = [], [], []
+    wrong, stds, whole = [], [], []
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        valid = np.ones(clean.shape, dtype=bool)
+        valid = np.ones(N, dtype=bool)
         for start in rng.integers(0, N - 60, 8):
-            valid[:, start : start + 50] = False
+            valid[start : start + 50] = False
         y = clean + 0.01 * rng.standard_normal(clean.shape)
-        broken = np.where(valid, y, 99.0)
-        options = {"delays": DELAYS, "band": BAND}
-        found = response_matrix(u, broken, FS, valid=valid, fill=clean, **options)
-        kept = found.usable & (found.frequency < 8.0)
-        errors.append(np.abs(found.response - true_matrix(found.frequency))[kept])
-        stds.append(found.std[kept])
-        whole.append(response_matrix(u, y, FS, **options).std[kept])
-    error, std = np.concatenate(errors), np.concatenate(stds)
+        for i, axis in enumerate(DIRECT):
+            broken = np.where(valid, y[i], 99.0)
+            found = alone(u, broken, axis[2], valid=valid, fill=clean[i])
+            error, std = errors(found, i)
+            kept = found.inputs[0].frequency < 8.0
+            wrong.append(error[kept])
+            stds.append(std[kept])
+            frequency, _, std = together(alone(u, y[i], axis[2]))
+            whole.append(std[frequency < 8.0])
+    error, std = np.concatenate(wrong), np.concatenate(stds)
     assert np.mean(error < 2 * std) > 0.9
     assert np.sqrt(np.mean(error**2)) < 1.5 * np.sqrt(np.mean(std**2))
     assert np.median(std) > np.median(np.concatenate(whole))
@@ -239,5 +266,5 @@ def test_gaps_cost_accuracy_and_the_error_says_so(
 
 def test_a_lost_output_is_refused(three_axes: tuple[np.ndarray, np.ndarray]) -> None:
     u, clean = three_axes
-    with pytest.raises(RecordError, match="output 0 has 0 valid samples"):
-        response_matrix(u, clean, FS, band=BAND, valid=np.zeros(N, dtype=bool), fill=clean)
+    with pytest.raises(RecordError, match="output has 0 valid samples"):
+        alone(u, clean[0], valid=np.zeros(N, dtype=bool))

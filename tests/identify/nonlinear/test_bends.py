@@ -41,7 +41,7 @@ BENT = {
 def found(u, y, *, floor=0.0):
     data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=90.0)
     fit = fit_structure(data, STRUCTURES["second_order"], TRUTH[:3], precision=1e-9)
-    return fit, bends(u, data, fit, intersample="foh", fs=FS, floor=floor)
+    return fit, bends(u, data, fit, intersample="foh", floor=floor)
 
 
 @pytest.mark.parametrize("kind", BENT)
@@ -91,7 +91,7 @@ def test_a_kind_that_shows_only_where_no_sample_counts_is_not_accused(last, off)
     source = prepare_input(SWEEP, "bandlimited")
     data = Problem(source=source, y=y, valid=counts, longest_delay=90.0)
     fit = fit_structure(data, STRUCTURES["second_order"], TRUTH[:3])
-    kinds = bends(SWEEP, data, fit, intersample="bandlimited", fs=FS)
+    kinds = bends(SWEEP, data, fit, intersample="bandlimited")
     assert all(one.effect < 0.1 for one in kinds)
 
 
@@ -104,5 +104,5 @@ def test_what_bends_beyond_the_end_of_the_record_is_not_weighed():
     )
     theta = np.array([430.0, *TRUTH[1:3]])
     fit = fit_structure(data, STRUCTURES["second_order"], theta, iterations=0)
-    found = bends(u, data, fit, intersample="bandlimited", fs=FS, floor=0.0)
+    found = bends(u, data, fit, intersample="bandlimited", floor=0.0)
     assert all(np.isfinite(one.moved).all() for one in found)

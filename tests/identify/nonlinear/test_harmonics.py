@@ -111,13 +111,13 @@ def test_what_is_no_sweep(kind):
 def test_each_power_makes_the_harmonic_of_trigonometry(order, shape, rms):
     noise = 1e-4 * np.random.default_rng(0).standard_normal(2000)
     found = harmonics(shape(CHIRP) + noise)
-    by_order = {h.order: h for h in found.orders}
+    by_order = {h.curve.order: h for h in found.orders}
     sweep = sweep_phase(CHIRP, FS)
     seen = np.mean(order * sweep.frequency[sweep.inside] < 0.9 * FS / 2)  # then it would fold
     assert by_order[order].rms == pytest.approx(rms * np.sqrt(seen), rel=0.02)
     assert by_order[order].probability < 1e-10
     for other in by_order.values():
-        if other.order != order:
+        if other.curve.order != order:
             assert other.rms < 0.02 * rms
 
 

@@ -9,7 +9,7 @@ import scipy
 import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
+from hmpim.identify.nonlinear.rows import linear_part, linear_part_finely
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.model.fine import FINE
 from hmpim.model.nonlinear import NonlinearPart

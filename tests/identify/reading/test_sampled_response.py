@@ -6,7 +6,7 @@ from scipy.signal import cont2discrete, lfilter
 
 import hmpim
 from hmpim.identify import gain_and_phase
-from hmpim.identify.reading.sampled_response import sampled_response
+from hmpim.identify.reading.bandwidth import sampled_response
 from hmpim.model import RationalDelay, response
 
 FS = 100.0

@@ -8,6 +8,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.statistics import misfit
 from hmpim.identify.statistics.choose import choose
 from hmpim.identify.statistics.fit import as_fitted
+from hmpim.model import STRUCTURES
 
 
 def test_a_pole_that_the_model_imitates_has_no_endless_square(monkeypatch):
@@ -18,7 +19,7 @@ def test_a_pole_that_the_model_imitates_has_no_endless_square(monkeypatch):
     y = y + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
     record = hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=200.0, intersample="bandlimited")
     statistics = hmpim.compress(record)
-    _, joint = choose(statistics)
+    _, joint = choose(statistics, intersample=None, structures=tuple(STRUCTURES))
     fitted = as_fitted(joint.best.fit)
 
     def imitated(problem, fit):

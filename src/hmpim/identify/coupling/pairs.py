@@ -110,16 +110,9 @@ class Pairs:
             others = (one for one in found if one is not found[k])
             moved = (one.prediction - one.linear[-1] - one.nuisance @ rows for one in others)
             own = replace(before[k].problem, y=y - sum(moved, np.zeros(y.size)), valid=valid)
-            trial = before[k].best
-            best = replace(trial, fit=found[k])
-            self.fits[j] = replace(
-                before[k],
-                problem=own,
-                weighed=own,
-                best=best,
-                trials=tuple(best if t is trial else t for t in before[k].trials),
-                effective_share=effective_share(found[k].residual),
-            )
+            share = effective_share(found[k].residual)
+            moved_fit = before[k].with_fit(found[k])
+            self.fits[j] = replace(moved_fit, problem=own, weighed=own, effective_share=share)
         return problems, found
 
     def demote(self) -> bool:

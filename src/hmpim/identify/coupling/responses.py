@@ -1,7 +1,7 @@
 """Several inputs at once: measured response to each, and findings on weak or similar inputs."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import pairwise
 from typing import Any
@@ -16,7 +16,7 @@ from hmpim.identify.coupling.inputs import input_set
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.residual import misfits_of_inputs
 from hmpim.identify.coupling.weak import unsettled
-from hmpim.identify.frf.multivariable import ResponseMatrix, response_matrix
+from hmpim.identify.frf.multivariable import JointResponse, joint_response
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result import (
     Estimate,
@@ -61,13 +61,7 @@ class Responses:
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
-    """Find which inputs the record distinguishes; refuse those that it cannot.
-
-    Raises
-    ------
-    RecordError
-        If inputs are the same, or pass every frequency alike.
-    """
+    """Find which inputs the record distinguishes; refuse some that pass every frequency alike."""
     found = input_set(
         [s.values for s in aligned.inputs],
         [s.name for s in aligned.inputs],
@@ -105,7 +99,7 @@ def responses_of(
         coherence=OutputCoherence(
             output=output.name,
             frequency=_joined([m.frequency for _, m in pieces]),
-            multiple=_joined([m.multiple_coherence[:, 0] for _, m in pieces]),
+            multiple=_joined([m.multiple_coherence for _, m in pieces]),
         ),
         left=cache(
             lambda: misfits_of_inputs(
@@ -120,7 +114,7 @@ def responses_of(
 
 def _pieces(
     aligned: Aligned, output: Signal, counts: Mask | None, joined: OutputFit, inputs: InputSet
-) -> list[tuple[list[int], ResponseMatrix]]:
+) -> list[tuple[list[int], JointResponse]]:
     """Responses in each band, and the inputs that they belong to.
 
     The band is cut where one of the inputs' begins or ends. The response to an input outside its
@@ -135,7 +129,7 @@ def _pieces(
         y, whole = y - joined.disturbance, whole - joined.disturbance
     span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
-    pieces: list[tuple[list[int], ResponseMatrix]] = []
+    pieces: list[tuple[list[int], JointResponse]] = []
     for low, high in pairwise(edges):
         active = [j for j, band in enumerate(inputs.bands) if band[0] <= low and band[1] >= high]
         bins = (high - low) * span
@@ -145,29 +139,28 @@ def _pieces(
         for j, part in enumerate(parts):
             if j not in active and joined.fits[j].related:
                 rest, modelled = rest - part, modelled - part
-        found = response_matrix(
+        found = joint_response(
             np.stack([aligned.inputs[j].values for j in active]),
-            rest[None, :],
+            rest,
             aligned.fs,
-            delays=[[delay]],
+            delay=delay,
             band=(low, high),
             valid=counts,
-            fill=modelled[None, :],
-            points=200,
+            fill=modelled,
             names=[*(aligned.inputs[j].name for j in active), output.name],
         )
         pieces.append((active, found))
     return pieces
 
 
-def _column(pieces: list[tuple[list[int], ResponseMatrix]], j: int) -> FrequencyResponse:
+def _column(pieces: list[tuple[list[int], JointResponse]], j: int) -> FrequencyResponse:
     """One input's response at the frequencies where the inputs are distinguished."""
-    own = [(m, (m.usable, 0, active.index(j))) for active, m in pieces if j in active]
+    parts = [piece.inputs[active.index(j)] for active, piece in pieces if j in active]
     return FrequencyResponse(
-        frequency=_joined([m.frequency[m.usable] for m, _ in own]),
-        response=np.asarray(_joined([m.response[at] for m, at in own]), dtype=np.complex128),
-        std=_joined([m.std[at] for m, at in own]),
-        coherence=_joined([m.partial_coherence[at] for m, at in own]),
+        frequency=_joined([part.frequency for part in parts]),
+        response=np.asarray(_joined([part.response for part in parts]), dtype=np.complex128),
+        std=_joined([part.std for part in parts]),
+        coherence=_joined([part.coherence for part in parts if part.coherence is not None]),
     )
 
 
@@ -366,21 +359,17 @@ def _determined(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, l
         (uncertain, ("peak_gain_db",)),
         (late, ("delay", "delay_low_frequency")),
     )
-    known = {name: getattr(p, name) for _, names in tests for name in names}
-    gone = {n for bad, names in tests for n in names if known[n] is not None and bad(known[n])}
+    known = p.given
+    gone = {n for bad, names in tests for n in names if n in known and bad(known[n])}
     if "natural_frequency" in gone:
         gone |= {"damping_ratio", "peak_gain_db"}
     if "scale_factor" in gone:
         gone |= set(_WITH_GAIN) | {"delay_low_frequency", "delay_correlation"}
-    unknown = [name for name in _WITH_GAIN if name in gone and getattr(p, name) is not None]
+    unknown = [name for name in _WITH_GAIN if name in gone and name in known]
     return replace(p, **dict.fromkeys(gone, None)), unknown
 
 
 def _finite(p: Parameters) -> Parameters:
     """The parameters without those whose error is not finite."""
-    bad = [
-        f.name
-        for f in fields(p)
-        if (e := getattr(p, f.name)) is not None and not np.isfinite(e.spread)
-    ]
+    bad = [name for name, e in p.given.items() if not np.isfinite(e.spread)]
     return replace(p, **dict.fromkeys(bad, None))

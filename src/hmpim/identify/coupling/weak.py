@@ -20,6 +20,7 @@ from hmpim.identify.arrays import Complex, Real, averaged
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM, searched
 from hmpim.identify.fitting.candidates import in_best_sample, nested
 from hmpim.identify.fitting.course import bridged
+from hmpim.identify.fitting.data import TASTE
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.start import RoughResponse, rough_response, starting_values
@@ -52,7 +53,6 @@ _ALIKE = 1e-6
 """Power, over the strongest in the window, below which an input, or what distinguishes two alike,
 is left out."""
 
-_TASTE = 4
 _STEPS = 25
 
 _POINTS = 16
@@ -66,14 +66,6 @@ def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0
     The inverse root of its periodogram, averaged over a tenth of the frequency on either side. The
     residual, (n,), is 0 where a sample does not count. Whitened, the noise in it has unit variance;
     what follows any of the `inputs`, (n,), at a delay of about `late` samples, is not noise.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> whitening_of(rng.standard_normal(1000)) is None
-    True
-    >>> whitening_of(np.cumsum(rng.standard_normal(1000))).shape
-    (501,)
     """
     if is_white(residual):
         return None
@@ -150,7 +142,7 @@ def coupling_fit(
             starts += [nested(fit) for fit in simpler if not structure.dc_zeros]
             lag = fits[0].delay if fits and not structure.dc_zeros else float(seen.lag)
             starts += _resonances(seen, lag)
-        found = [fit_structure(problem, structure, s, iterations=_TASTE) for s in starts]
+        found = [fit_structure(problem, structure, s, iterations=TASTE) for s in starts]
         best = min(found, key=lambda fit: fit.objective)
         if not best.converged:
             best = fit_structure(problem, structure, best.theta, iterations=_STEPS)

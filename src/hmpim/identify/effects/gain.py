@@ -112,21 +112,6 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     residual that something else explains, such as a nonlinearity.
 
     None if no change is significant, or if something else explains more.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.course import continued, start
-    >>> from hmpim.identify.fitting.joint import chosen_of, joint_fit
-    >>> t = np.arange(1000) / 1000
-    >>> u, late = (np.sin(2 * np.pi * (2 * s + 40 * s**2)) for s in (t, t - 0.005))
-    >>> y = (1.05 - 0.1 * t) * late + 0.01 * np.random.default_rng(0).standard_normal(1000)
-    >>> begun = start(u, y, None, None, None, PLAIN, None)
-    >>> def fitted(y, rows, plainly):
-    ...     course = replace(begun, data=replace(begun.data, y=y))
-    ...     return chosen_of(continued(course, valid=None, nuisance=rows), PLAIN)
-    >>> found = changing_gain(joint_fit(u, y, structures=PLAIN), fitted, lambda *_: 0.0)
-    >>> found.joint.best.fit.structure.name, found.taken, round(found.change, 2)
-    ('static', True, -0.1)
     """
     best = first.best.fit
     if best.structure.integrators or best.structure.sampled or best.objective <= 0.0:

@@ -47,15 +47,7 @@ class Updates:
 
 
 def updates(hold: Hold, samples: int, fs: float) -> Updates:
-    """Return the samples of a record, at a rate in Hz, in which a new value arrives.
-
-    Examples
-    --------
-    >>> clock = Hold(period=0.25, phase=0.05, std=0.0, phase_std=0.0)
-    >>> found = updates(clock, 8, 10.0)
-    >>> found.index.tolist(), found.age.round(6).tolist()
-    ([1, 3, 6], [0.5, 0.0, 0.5])
-    """
+    """Return the samples of a record, at a rate in Hz, in which a new value arrives."""
     period, phase = hold.period * fs, hold.phase * fs
     count = max(int(np.floor((samples - 1 - phase) / period)) + 1, 0)
     instant = phase + period * np.arange(count)
@@ -74,16 +66,6 @@ def detect_hold(y: Real, fs: float, prediction: Real | None = None) -> Hold | No
     The prediction of a model without a hold, (n,), distinguishes a held output from an input that
     stands still. None if the output is updated at every sample, changes by no steady clock, or
     takes fewer than ten different values.
-
-    Examples
-    --------
-    A sensor of 30 Hz recorded at 200 Hz:
-
-    >>> sample = np.arange(2000)
-    >>> last = np.floor(sample * 30 / 200 + 1e-9)
-    >>> found = detect_hold(np.sin(last / 5), 200.0)
-    >>> round(1 / found.period, 3)
-    30.0
     """
     change = np.abs(np.diff(y))
     changed = _changed(y, change)

@@ -54,15 +54,6 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     """Return the samples that are spikes compared with a first model's prediction, or None.
 
     `clipped` samples are ignored.
-
-    Examples
-    --------
-    >>> y = 0.1 * np.random.default_rng(0).standard_normal(500)
-    >>> find_spikes(y, np.zeros(500)) is None
-    True
-    >>> y[[100, 301]] += [3.0, -2.0]
-    >>> np.flatnonzero(find_spikes(y, np.zeros(500))).tolist()
-    [100, 301]
     """
     residual = y - prediction
     counted = residual if clipped is None else residual[~clipped]
@@ -88,15 +79,6 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
     """Return the samples at which the output stands still while the model moves, or None.
 
     `step` is the rounding step of the output, in its unit; 0 for none.
-
-    Examples
-    --------
-    >>> moving = np.sin(np.arange(1000) / 20) + 0.01 * np.random.default_rng(0).normal(size=1000)
-    >>> find_frozen(moving, np.sin(np.arange(1000) / 20)) is None
-    True
-    >>> moving[200:300] = moving[200]
-    >>> np.flatnonzero(find_frozen(moving, np.sin(np.arange(1000) / 20)))[[0, -1]].tolist()
-    [201, 299]
     """
     repeats = np.concatenate([[False], np.diff(y) == 0.0])
     frozen = np.zeros(y.size, dtype=bool)
@@ -117,16 +99,6 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
 
     It needs no model, and runs before the first fit, which a sensor stuck for much of the record
     would spoil. A standstill at the lowest or highest value is clipping.
-
-    Examples
-    --------
-    >>> u = np.sin(np.arange(1000) / 20)
-    >>> y = u + 0.01 * np.random.default_rng(0).normal(size=1000)
-    >>> find_stuck(y, [u]) is None
-    True
-    >>> y[700:] = y[700]
-    >>> np.flatnonzero(find_stuck(y, [u]))[[0, -1]].tolist()
-    [701, 999]
     """
     if y.size < _FEWEST_EQUAL or y[-1] != y[-2] or y[-1] in (y.min(), y.max()):
         return None
@@ -145,15 +117,6 @@ def find_repeated(y: Real) -> Mask | None:
     A lost frame is often replaced by the one before. An output that is rounded, held or at rest
     repeats itself too, but not for just a sample or two now and then. Equal samples at the highest
     or lowest value may be clipped: they count only in addition to others.
-
-    Examples
-    --------
-    >>> moving = np.random.default_rng(0).standard_normal(1000)
-    >>> find_repeated(moving) is None
-    True
-    >>> moving[[100, 200, 201]] = moving[[99, 199, 199]]
-    >>> np.flatnonzero(find_repeated(moving)).tolist()
-    [100, 200, 201]
     """
     copies = np.concatenate([[False], np.diff(y) == 0.0])
     if not copies.any() or np.mean(copies) > PART:

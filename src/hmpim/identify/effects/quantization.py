@@ -56,16 +56,6 @@ def detect_quantization(y: Real) -> Quantization | None:
     Give the values as recorded: resampling blurs the grid. None for continuous data, for data
     rounded to significant digits rather than to a step, for fewer than five levels, and for a step
     below 2^-22 of the greatest value if all values are single-precision numbers, or else 2^-44.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> angle = np.sin(np.arange(1000) / 50)
-    >>> found = detect_quantization(0.003 * np.rint(angle / 0.003))
-    >>> round(found.step, 9)
-    0.003
-    >>> detect_quantization(angle) is None
-    True
     """
     largest, span = float(np.max(np.abs(y))), float(np.ptp(y))
     if span == 0.0:

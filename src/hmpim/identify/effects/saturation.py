@@ -69,16 +69,6 @@ def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 
     corrected on the samples that are not at the level. It distinguishes a short plateau from a
     crest, and a clipped wave from a square one. `step` is that to which `y` is rounded, in its
     unit; 0 for none (see `detect_quantization`).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> y = np.sin(np.arange(1000) / 50)
-    >>> found = detect_saturation(np.clip(y, -2.0, 0.8))
-    >>> found.high.level, found.low
-    (0.8, None)
-    >>> detect_saturation(y).high is None
-    True
     """
     scatter = _scatter(y)
     high = _upper(y, prediction, step, scatter)

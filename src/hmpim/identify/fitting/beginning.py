@@ -258,12 +258,7 @@ def _stands_out(innovations: Real, some: Mask, others: Mask) -> bool:
 def stand_out_of(innovations: Real, some: Mask) -> Mask:
     """Which residuals have more power in some samples than the noise in the others explains.
 
-    Parameters
-    ----------
-    innovations : ndarray, shape (k, n)
-        Residuals, whitened.
-    some : ndarray of bool, shape (k, n)
-        The samples to test; the noise is estimated from the others.
+    The residuals, (k, n), are whitened; `some`, (k, n), are the samples to test.
     """
     squares = innovations**2
     counts = np.count_nonzero(some, axis=1)

@@ -16,25 +16,13 @@ __all__ = ["combined", "jacobian", "products"]
 def jacobian(
     problem: Problem, fit: Fit, *more: Real, part: Part | SampledPart | None = None
 ) -> Real:
-    """Derivatives of the prediction with respect to theta, then to `fit.linear`.
+    """Derivatives of the prediction with respect to theta, then to `fit.linear`; then more rows.
 
     Drift and initial state, where they are fitted, are projected out, so that the inverse of the
-    rows' Gram matrix is the covariance with them unknown.
-
-    Parameters
-    ----------
-    problem, fit : Problem, Fit
-        The data, and the fit at which derivatives are taken.
-    *more : ndarray, shape (n,)
-        Rows of other parameters, treated alike.
-    part : Part or SampledPart, optional
-        The input's rows at the fit, if already computed. Its free response is ignored where the
-        problem has none.
-
-    Returns
-    -------
-    ndarray, shape (1 + order + m + 1 + len(more), n)
-        Zero where a sample does not count.
+    rows' Gram matrix is the covariance with them unknown. The shape is
+    (1 + order + m + 1 + len(more), n), with 0 where a sample does not count. `part` holds the
+    input's rows at the fit, if already computed; its free response is ignored where the problem has
+    none.
     """
     part = part_of(problem, fit.structure, fit.theta) if part is None else part
     bias = np.ones((1, problem.y.size))
@@ -73,24 +61,11 @@ def products(
     part: Part | SampledPart | None = None,
     edges: tuple[int, ...] = (),
 ) -> Real:
-    """Inner products of the rows of `jacobian` and of a residual, which comes last.
+    """Inner products of the rows of `jacobian` and of a residual, (n,), which comes last.
 
     They are summed in stretches, so that no row is as long as the record unless samples are
-    whitened.
-
-    Parameters
-    ----------
-    problem, fit, *more, part
-        As for `jacobian`.
-    residual : ndarray, shape (n,)
-        0 where a sample does not count.
-    edges : tuple of int
-        Samples at which a new span begins; each span's products are returned separately.
-
-    Returns
-    -------
-    ndarray, shape (1 + len(edges), q, q)
-        q = 1 + order + m + 1 + len(more) + 1.
+    whitened. At each of the `edges`, samples, a new span begins; each span has products of its own,
+    (1 + len(edges), q, q). The residual is 0 where a sample does not count.
     """
     part = part_of(problem, fit.structure, fit.theta) if part is None else part
     others, size, n = _others(problem, part), fit.theta.size, residual.size

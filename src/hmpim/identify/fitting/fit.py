@@ -57,45 +57,25 @@ FORGETS = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Fit:
-    """The result of a fit, for one input.
-
-    Parameters
-    ----------
-    structure : Structure
-        The fitted structure.
-    theta : ndarray, shape (1 + order,)
-        Delay in samples, then the parameters of the denominator's sections (`coefficients_of`),
-        time in samples.
-    linear : ndarray, shape (m + 1,)
-        Numerator coefficients by rising power of s (the first is the scale factor), or the gains
-        that `numerator_of` takes instead; bias.
-    prediction : ndarray, shape (n,)
-        Output of the fitted model, drift and free response included; with several inputs, the
-        part due to this one, bias and drift.
-    residual : ndarray, shape (n,)
-        Output less the prediction from all inputs, not whitened; 0 where a sample does not count.
-    cost : float
-        Sum of squares of the residual.
-    objective : float
-        The minimised sum of squares: of the residual, whitened if the problem whitens.
-    converged : bool
-        Whether the last step was negligible.
-    nuisance : ndarray, shape (k,)
-        Weights of the problem's nuisance rows.
-    initial : ndarray, shape (order,) or (0,)
-        Weights of the free responses.
-    """
+    """The result of a fit, for one input."""
 
     structure: Structure
+    # (1 + order,): delay in samples, then the parameters of the denominator's sections
+    # (`coefficients_of`), time in samples
     theta: Real
+    # (m + 1,): numerator coefficients by rising power of s (the first is the scale factor), or the
+    # gains that `numerator_of` takes instead; bias
     linear: Real
+    # (n,): output of the fitted model, drift and free response included; with several inputs, the
+    # part due to this one, bias and drift
     prediction: Real
+    # (n,): output less the prediction from all inputs, not whitened; 0 if a sample does not count
     residual: Real
-    cost: float
-    objective: float
-    converged: bool
-    nuisance: Real
-    initial: Real
+    cost: float  # sum of squares of the residual
+    objective: float  # minimised sum of squares: of the residual, whitened if the problem whitens
+    converged: bool  # whether the last step was negligible
+    nuisance: Real  # (k,): weights of the problem's nuisance rows
+    initial: Real  # (order,) or (0,): weights of the free responses
 
     @property
     def delay(self) -> float:
@@ -278,14 +258,7 @@ def evaluating(
 ) -> Callable[[Sequence[Real]], Evaluation]:
     """Return a function that evaluates all inputs at given parameters, here by samples.
 
-    Other kinds of problem register a function of their own.
-
-    Parameters
-    ----------
-    first : Problem
-        That of the first input, whose kind decides.
-    problems, structures
-        As for `fit_together`.
+    The kind of the first input's problem decides: others register a function of their own.
     """
     known = _known(first)
 
@@ -352,27 +325,11 @@ def fit_structure(
 ) -> Fit:
     """Fit one structure from one start.
 
-    Parameters
-    ----------
-    problem : Problem
-        The data.
-    structure : Structure
-        What to fit.
-    theta : ndarray, shape (1 + order,)
-        Start: delay in samples, parameters of the denominator's sections.
-    iterations : int
-        At most so many steps.
-    precision : float
-        Stop when a step lowers the sum of squares by less than this, in units of σ²; a
-        parameter then is within about the root of it, in standard deviations.
-    hopeless : float
-        Stop where a step promises to leave more than this, and more than a quarter of what it
-        begins with.
-
-    Returns
-    -------
-    Fit
-        `converged` is False if the steps ran out.
+    `theta`, (1 + order,), is the start: delay in samples, parameters of the denominator's sections.
+    The fit has converged if a step lowers the sum of squares by less than `precision`, in units of
+    σ²; a parameter then is within about the root of it, in standard deviations. It is given up
+    after so many iterations, or where a step promises to leave more than `hopeless`, and more than
+    a quarter of what it begins with.
     """
     limits = {"precision": precision, "hopeless": hopeless}
     return fit_together([problem], [structure], [theta], iterations=iterations, **limits)[0]
@@ -387,19 +344,10 @@ def fit_together(
     precision: float = 1e-2,
     hopeless: float = np.inf,
 ) -> list[Fit]:
-    """Fit one output to several inputs at once, each with a structure of its own.
+    """Fit one output to several inputs at once, each with a structure and a start of its own.
 
-    Parameters
-    ----------
-    problems : sequence of Problem
-        One for each input; output, mask, whitening, nuisance and beginning are the first one's.
-    structures, thetas, iterations, precision, hopeless
-        As for `fit_structure`, one structure and start for each input.
-
-    Returns
-    -------
-    list of Fit
-        One for each input, residual and cost common to all.
+    There is a problem for each input; output, mask, whitening, nuisance and beginning are the first
+    one's. All else is as for `fit_structure`. Residual and cost are common to all fits.
     """
     problems = list(map(kept_in_sample, problems, structures, thetas))
 

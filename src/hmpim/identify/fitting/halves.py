@@ -23,43 +23,21 @@ _DETERMINED = 1e-8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Halves:
-    """How much the halves of a record differ.
+    """How much the halves of a record differ."""
 
-    Parameters
-    ----------
-    probability : float
-        Chance of so large a difference if one model were right for both and the noise white.
-    share : float
-        Share of the residual's power that a model for each half would explain.
-    owed : float
-        The same as an r.m.s. over that of the whole output. Not over a half's own: in one half of
-        a sweep the output hardly moves, and friction is much of that but little of the record.
-    """
-
+    # chance of so large a difference if one model were right for both and the noise white
     probability: float
-    share: float
+    share: float  # of the residual's power that a model for each half would explain
+    # the same as an r.m.s. over that of the whole output. Not over a half's own: in one half of a
+    # sweep the output hardly moves, and friction is much of that but little of the record
     owed: float
 
 
 def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
-    """Compare the halves of a fit.
+    """Compare the halves of a fit, from `products_of_halves`, (2, p + 1, p + 1).
 
-    Parameters
-    ----------
-    halves : ndarray, shape (2, p + 1, p + 1)
-        For each half, products of the derivatives of the prediction and of the residual.
-    y : ndarray, shape (n,)
-        The output about its mean, weighted like the residual; 0 where a sample does not count.
-    share : float
-        Independent samples per sample.
-
-    Examples
-    --------
-    >>> rows = np.ones((1, 200))
-    >>> drifting = np.concatenate([-np.ones(100), np.ones(100)])
-    >>> halves = products_of_halves(rows, drifting + 0.1 * rows[0])
-    >>> compare_halves(halves, drifting, share=1.0).probability < 1e-6
-    True
+    `y`, (n,), is the output about its mean, weighted like the residual, 0 where a sample does not
+    count; `share` is that of independent samples.
     """
     chance, gained = halves_of(halves[:, None], y.size, share=share)
     power, size = float(halves[:, -1, -1].sum()), float(np.vecdot(y, y))
@@ -73,10 +51,7 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
 def products_of_halves(rows: Real, residual: Real) -> Real:
     """Products of rows, (..., p, n), and residuals, (..., n), over either half of a record.
 
-    Returns
-    -------
-    ndarray, shape (2, ..., p + 1, p + 1)
-        The residual last.
+    The shape is (2, ..., p + 1, p + 1), the residual last.
     """
     every, middle = np.concatenate([rows, residual[..., None, :]], axis=-2), rows.shape[-1] // 2
     parts = (every[..., :middle], every[..., middle:])
@@ -86,14 +61,8 @@ def products_of_halves(rows: Real, residual: Real) -> Real:
 def halves_of(halves: Real, samples: int, *, share: float) -> tuple[Real, Real]:
     """Compare the halves of many fits; probabilities and sums of squares gained, shape (k,).
 
-    Parameters
-    ----------
-    halves : ndarray, shape (2, k, p + 1, p + 1)
-        For each half, products of the derivatives of the predictions and of the residuals.
-    samples : int
-        Number of samples in the record.
-    share : float
-        Independent samples per sample.
+    `halves`, (2, k, p + 1, p + 1), are from `products_of_halves`, of the derivatives of the
+    predictions, over a record of so many samples; `share` is that of independent samples.
     """
     count, p = halves.shape[1], halves.shape[-1] - 1
     variance = halves[:, :, p, p].sum(axis=0) / max(samples - p, 1)

@@ -16,6 +16,7 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
+from hmpim.model.sampled import companion
 
 __all__ = ["at_ends", "in_whole_samples", "kept_in_sample", "steps_through"]
 
@@ -65,16 +66,8 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
 
     With y = C x + D u behind a delay of d + f samples, d whole, the input last stepped 1 - f before
     a sample. The samples determine C e^{A (1 - f)} and D + C Γ(1 - f), with Γ the integral of
-    e^{At} B, and from these follow C and D at any other f.
-
-    Parameters
-    ----------
-    structure : Structure
-        One for which `in_whole_samples` is true, with poles.
-    theta : ndarray, shape (1 + order,)
-        Delay in samples, parameters of the sections.
-    linear : ndarray, shape (m + 1,)
-        Numerator and bias.
+    e^{At} B, and from these follow C and D at any other f. `in_whole_samples` is true of the
+    structure, which has poles; theta, (1 + order,), and linear, (m + 1,), are as of a `Fit`.
     """
     below = denominator_of(structure, coefficients_of(structure, theta[1:]))
     order, first = structure.order, structure.dc_zeros
@@ -100,10 +93,5 @@ def at_ends(structure: Structure, theta: Real, linear: Real) -> list[tuple[Real,
 
 def _steps(below: Real, time: float) -> tuple[Real, Real]:
     """e^{At} and Γ(t) of a companion form, `below` by rising powers of s per sample."""
-    order = below.size - 1
-    matrix = np.zeros((order + 1, order + 1))
-    matrix[np.arange(order - 1), np.arange(1, order)] = 1.0
-    matrix[order - 1, :order] = -below[:-1] / below[-1]
-    matrix[order - 1, order] = 1.0 / below[-1]
-    step = scipy.linalg.expm(matrix * time)
-    return step[:order, :order], step[:order, order]
+    step = scipy.linalg.expm(companion(below, 1) * time)
+    return step[:-1, :-1], step[:-1, -1]

@@ -41,7 +41,7 @@ from hmpim.identify.fitting.growth import (
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
-from hmpim.identify.fitting.whitening import refit_whitened, weighed_by_noise
+from hmpim.identify.fitting.whitening import weighed_by_noise
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -107,12 +107,7 @@ def chosen_of(
 ) -> JointFit:
     """Finish the search once the plain structures are fitted to the samples that count.
 
-    Parameters
-    ----------
-    course : Course
-        The plain fits under the natural assumption.
-    structures, growing
-        As for `joint_fit`.
+    The course has the plain fits under the natural assumption; the rest is as for `joint_fit`.
     """
     fitted = continue_between(course)
     if is_unanswered(course, fitted):
@@ -255,20 +250,17 @@ def give_up(course: Course, fitted: Fits) -> JointFit:
 
 
 def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
-    """Compare all fits under one noise model; the course with it, trials, best, effective share."""
+    """Compare all fits under one noise model, and polish the best.
+
+    Returned are the course with that model, all trials, the best, and the effective share.
+    """
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)
     share = leading.share
     weighed = weighed_by_noise(data.problem(mode, seen), leading, data)
     if weighed.noise is not None or data.noise is not None:
         course = replace(course, data=weighed)
-        fitted = refit_whitened(course.data, fitted, seen)
-    trials, best = _decide(course, fitted, share)
-    return course, trials, best, share
-
-
-def _decide(course: Course, fitted: Fits, share: float) -> tuple[list[Trial], Trial]:
-    """All trials, and the chosen one among them, polished."""
+        fitted = refit_all(weighed, fitted, seen, hopeful=TWICE * leading.objective)
     count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
     chosen = likeliest_of(trials, course.natural)
@@ -276,4 +268,4 @@ def _decide(course: Course, fitted: Fits, share: float) -> tuple[list[Trial], Tr
     best = trial_of(
         chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
     )
-    return [best if trial is chosen else trial for trial in trials], best
+    return course, [best if trial is chosen else trial for trial in trials], best, share

@@ -85,15 +85,10 @@ def explained(
 ) -> tuple[Real, NDArray[np.intp]]:
     """Power of residuals that rows explain, (...,), and the directions that they determine.
 
-    Parameters
-    ----------
-    gram, moment : ndarray, shapes (..., k, k) and (..., k)
-        Products of the rows among them, and with the residuals.
-    least : float
-        Share of the greatest eigenvalue below which a direction is not determined, rows scaled to
-        unit power.
-    size : ndarray, shape (..., k), optional
-        Power of each row before the scaling, if it is not on the diagonal of `gram`.
+    `gram`, (..., k, k), and `moment`, (..., k), are products of the rows among them and with the
+    residuals. With rows scaled to unit power, a direction is not determined below the share `least`
+    of the greatest eigenvalue. `size`, (..., k), is the power of each row before the scaling, if it
+    is not on the diagonal of `gram`.
     """
     power = np.diagonal(gram, axis1=-2, axis2=-1) if size is None else size
     # Rounding may leave a row less power than none: it determines nothing.

@@ -19,13 +19,7 @@ _PRECISION = 1e-4
 
 
 def plainer(joint: JointFit) -> Fit | None:
-    """Best fit of a plain structure, refined; None if the chosen one is plain, or none was tried.
-
-    Parameters
-    ----------
-    joint : JointFit
-        From `joint_fit`.
-    """
+    """Best fit of a plain structure, refined; None if the chosen one is plain or none was tried."""
     best = joint.best
     if best.fit.structure.name in PLAIN:
         return None
@@ -39,12 +33,9 @@ def plainer(joint: JointFit) -> Fit | None:
 
 
 def taking(joint: JointFit, fit: Fit) -> JointFit:
-    """Replace the chosen fit by another one, of a structure that was tried.
+    """Replace the chosen fit by another one to the same data, of a structure that was tried.
 
-    Parameters
-    ----------
-    joint, fit : JointFit, Fit
-        From `joint_fit`, and a fit to the same data; nothing changes if it is the chosen one.
+    Nothing changes if it is the chosen one.
     """
     if fit is joint.best.fit:
         return joint

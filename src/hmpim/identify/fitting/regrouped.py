@@ -29,14 +29,6 @@ def regrouped(structure: Structure, theta: Real) -> Real | None:
     """Parameters, (1 + order,), of the same model with two poles that have met in one section.
 
     None if no poles have met, or for modes in parallel, of which each has a gain of its own.
-
-    Examples
-    --------
-    >>> from hmpim.model.dynamics import STRUCTURES
-    >>> third = STRUCTURES["third_order"]
-    >>> met = np.append(0.0, theta_of(third, [20.0 + 4.0, 20.0 * 4.0, 4.1]))
-    >>> coefficients_of(third, regrouped(third, met)[1:]).round(6).tolist()
-    [8.1, 16.4, 20.0]
     """
     if structure.parallel or len(structure.sections) < 2:
         return None

@@ -43,47 +43,29 @@ def spans(first: int, last: int) -> Iterator[slice]:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Problem:
-    """One input, one output, and which samples of the output count.
+    """One input, one output, and which samples of the output count."""
 
-    Parameters
-    ----------
-    source : SampledInput
-        The prepared input.
-    y : ndarray, shape (n,)
-        Output samples.
-    valid : ndarray of bool, shape (n,), or None
-        Samples that count; None when all do.
-    longest_delay : float
-        Greatest delay to try, in samples.
-    shortest_delay : float
-        Least delay to try, in samples; below 0 the output is ahead, or its stamps are late.
-    whitening : ndarray, shape (n // 2 + 1,), or None
-        Gain at each bin of the transform that makes the noise white; residuals and derivatives
-        are then those of the whitened output. None for white noise.
-    noise : ndarray, shape (order + 1,), or None
-        Autoregression of the noise, 1 first, by which residual and derivatives are whitened.
-    past_known : ndarray of bool, shape (n,), or None
-        With `noise`, the samples that count together with all earlier ones the filter uses.
-    level : ndarray, shape (n,), or None
-        With `noise`, the level of the whitened noise at each sample, over its geometric mean:
-        whitened samples are divided by it. None for a constant level.
-    nuisance : ndarray, shape (k, n), or None
-        Rows, in addition to the bias, that enter linearly, such as a drift's.
-    begins : int or None
-        Sample from which the free response of an unknown state is fitted; earlier ones do not
-        count. None for a record that begins at rest.
-    """
-
-    source: SampledInput
-    y: Real
-    valid: Mask | None
-    longest_delay: float
+    source: SampledInput  # the prepared input
+    y: Real  # (n,): output samples
+    valid: Mask | None  # (n,): samples that count; None when all do
+    longest_delay: float  # greatest delay to try, in samples
+    # least delay to try, in samples; below 0 the output is ahead, or its stamps are late
     shortest_delay: float = STAMPED_LATE
+    # (n // 2 + 1,): gain at each bin of the transform that makes the noise white; residuals and
+    # derivatives are then those of the whitened output. None for white noise.
     whitening: Real | None = None
+    # (order + 1,): autoregression of the noise, 1 first, by which residual and derivatives are
+    # whitened; None for white noise
     noise: Real | None = None
+    # (n,): with `noise`, the samples that count together with all earlier ones the filter uses
     past_known: Mask | None = None
+    # (n,): with `noise`, the level of the whitened noise at each sample, over its geometric mean:
+    # whitened samples are divided by it. None for a constant level.
     level: Real | None = None
+    # (k, n): rows, in addition to the bias, that enter linearly, such as a drift's
     nuisance: Real | None = None
+    # sample from which the free response of an unknown state is fitted; earlier ones do not count.
+    # None for a record that begins at rest.
     begins: int | None = None
     final: ClassVar[float] = _FINAL
 
@@ -187,14 +169,8 @@ class Driven:
 class Part(Driven):
     """Response of the output to one input at given parameters.
 
-    Parameters
-    ----------
-    problem : Problem
-        The input, and the sample at which free responses begin.
-    structure : Structure
-        The dynamics.
-    theta : ndarray, shape (1 + order,)
-        Delay in samples, then the parameters of the sections.
+    The problem gives the input, and the sample at which free responses begin; `theta`, (1 + order,)
+    holds the delay in samples, then the parameters of the sections.
     """
 
     def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:
@@ -236,16 +212,9 @@ class Part(Driven):
         self.free[:, self._lasts] = weights @ self._since_start
 
     def slopes(self, numerator: Real, initial: Real, here: slice = slice(None)) -> Real:
-        """Derivatives of the response by theta, shape (1 + order, n).
+        """Derivatives of the response by theta at the samples `here`, shape (1 + order, n).
 
-        Parameters
-        ----------
-        numerator : ndarray, shape (m,)
-            Weights of `rows`.
-        initial : ndarray, shape (order,) or (0,)
-            Weights of `free`.
-        here : slice
-            Requested samples, instead of all n.
+        `numerator`, (m,), holds the weights of `rows`, `initial` those of `free`, (order,) or (0,).
         """
         structure = self.structure
         full: Real = numerator @ self._numerators

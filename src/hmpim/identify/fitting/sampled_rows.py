@@ -18,14 +18,7 @@ _STEP = 1e-6
 class SampledPart(Driven):
     """Response of software to its input at given parameters; the same interface as `Part`.
 
-    Parameters
-    ----------
-    problem : Problem
-        The input, and the sample at which free responses begin.
-    structure : Structure
-        One of `hmpim.model.dynamics.FILTERS`.
-    theta : ndarray, shape (1 + order,)
-        Delay in whole samples, then the parameters of the sections.
+    The structure is one of `hmpim.model.dynamics.FILTERS`, its delay a whole number of samples.
     """
 
     def __init__(self, problem: Problem, structure: Structure, theta: Real) -> None:

@@ -149,15 +149,7 @@ def _blocks(parts: list[Complex]) -> Complex:
 
 
 def poles_of(structure: Structure, theta: Real) -> Poles | Parallel:
-    """Poles of a structure at the parameters of its sections, (order,), time in samples.
-
-    Examples
-    --------
-    >>> from hmpim.model.dynamics import STRUCTURES
-    >>> found = poles_of(STRUCTURES["second_order"], np.array([0.0, 1.0]))  # 1 + s + s²
-    >>> found.upper.round(3).tolist()
-    [(-0.5+0.866j)]
-    """
+    """Poles of a structure at the parameters of its sections, (order,), time in samples."""
     flat = coefficients_of(structure, theta)
     every = [0.0 + 0.0j] * structure.integrators
     coefficients, start = [], 0

@@ -16,7 +16,7 @@ import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -57,9 +57,6 @@ _REFINED = 4
 
 _TASTE = 6
 """Steps from each start before the best ones are fitted to convergence."""
-
-_POLISHED = 1e-6
-"""Precision of the chosen fits, see `fit_structure`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,18 +161,6 @@ def is_exact(u: Real, y: Real) -> bool:
     """Whether a difference equation holds to rounding: only software has no noise at all.
 
     All lagged samples together are tested first, on a few equations, then each filter.
-
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Samples of input and output.
-
-    Examples
-    --------
-    >>> u = np.sin(np.arange(400) ** 2 / 2000)
-    >>> y = scipy.signal.lfilter([0.2], [1.0, -0.8], np.concatenate([np.zeros(6), u[:-6]]))
-    >>> is_exact(u, y), is_exact(u, y + 1e-6 * np.cos(np.arange(400) ** 2))
-    (True, False)
     """
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
@@ -199,17 +184,9 @@ def software_fit(
 ) -> JointFit:
     """Fit every filter at every possible delay, and keep the one that the record supports.
 
-    Parameters
-    ----------
-    u, y, valid, nuisance
-        As for `hmpim.identify.fitting.joint.joint_fit`.
-    structures : tuple of str
-        Those in `FILTERS` are tried; all of `FILTERS` if there are none.
-
-    Returns
-    -------
-    JointFit
-        A trial for each structure and delay that was fitted.
+    Those of the `structures` that are filters are tried, all of `FILTERS` if there are none; the
+    rest is as for `hmpim.identify.fitting.joint.joint_fit`. There is a trial for each structure and
+    delay that was fitted.
     """
     names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
     return _software_fit(u, y, None if valid is None or valid.all() else valid, names, nuisance)
@@ -223,7 +200,7 @@ def _software_fit(
     equations = _equations(u, y, valid)
     source, latest = prepare_input(u, "sampled"), u.size // 2
     problem = Problem(source=source, y=y, valid=valid, longest_delay=latest, nuisance=nuisance)
-    floor = _ROUNDING**2 * float(np.sum(problem.masked(y - y.mean()) ** 2))
+    floor = _ROUNDING**2 * problem.spread
     fits = _followed(problem, equations, u, names, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
     if first.cost > floor and equations.cost_of_all <= floor:
@@ -285,7 +262,7 @@ def _followed(
     least = min(fit.cost for fit in fits)
     for i, fit in enumerate(fits):
         if fit.structure.order and fit.cost <= TWICE * least:
-            fits[i] = refit(problem, fit, precision=_POLISHED)
+            fits[i] = polished(problem, fit)
     return fits
 
 

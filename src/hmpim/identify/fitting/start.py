@@ -76,32 +76,15 @@ _FLOOR = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RoughResponse:
-    """Spectra with the coarse delay removed, on uniform bins.
+    """Spectra with the coarse delay removed, on uniform bins."""
 
-    Parameters
-    ----------
-    lag : int
-        Samples by which the output was moved back; below 0 where it is ahead of the input.
-    length : int
-        Length of the transform.
-    bins : ndarray of int, shape (m,)
-        Bins with excitation.
-    omega : ndarray, shape (m,)
-        Radians per sample at those bins.
-    response : complex ndarray, shape (m,)
-        Output over input.
-    weight : ndarray, shape (m,)
-        Power of the input, largest 1.
-    ahead : int or None
-        Lag below 0 at which the output resembles the input most; None if that lag is not below 0.
-    """
-
-    lag: int
-    length: int
-    bins: NDArray[np.intp]
-    omega: Real
-    response: Complex
-    weight: Real
+    lag: int  # samples by which the output was moved back; below 0 where it is ahead of the input
+    length: int  # length of the transform
+    bins: NDArray[np.intp]  # (m,): bins with excitation
+    omega: Real  # (m,): radians per sample at those bins
+    response: Complex  # (m,): output over input
+    weight: Real  # (m,): power of the input, largest 1
+    # lag below 0 at which the output resembles the input most; None if that lag is not below 0
     ahead: int | None = None
 
     @property
@@ -133,16 +116,10 @@ def _tapered_transform(u: Real, length: int) -> Complex:
 def rough_response(
     u: Real, y: Real, *, longest_delay: int, lag: int | None = None
 ) -> RoughResponse:
-    """Divide tapered spectra, the output first moved back by the coarse delay.
+    """Divide tapered spectra of samples, (n,), the output first moved back by the coarse delay.
 
-    Parameters
-    ----------
-    u, y : ndarray, shape (n,)
-        Uniform samples.
-    longest_delay : int
-        Greatest lag to consider, in samples.
-    lag : int, optional
-        Coarse delay in samples; that of the cross-correlation, 0 or more, if None.
+    That is `lag` samples or, if None, the lag of the greatest cross-correlation, from 0 to
+    `longest_delay` samples.
     """
     ahead = None
     if lag is None:
@@ -218,21 +195,8 @@ def starting_values(
 ) -> list[Real]:
     """Starts for `hmpim.identify.fitting.fit.fit_structure`, the most promising first.
 
-    Parameters
-    ----------
-    rough : RoughResponse
-        From `rough_response`.
-    structure : Structure
-        What will be fitted.
-    count : int
-        Most starts.
-    thorough : bool
-        Try several guesses of the corner frequency; one if False.
-
-    Returns
-    -------
-    list of ndarray, shape (1 + order,)
-        Delay in samples, parameters of the denominator's sections.
+    At most `count`, each (1 + order,): delay in samples, parameters of the denominator's sections.
+    A `thorough` search tries several guesses of the corner frequency, otherwise only one.
     """
     order, (finer, shifts) = structure.order, _shifts(rough, _COARSE if thorough else _FINE)
     scale = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))

@@ -1,6 +1,7 @@
 """All trials of a joint fit, and the choice among them."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from hmpim.identify.chance import LIKELIER
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
+from hmpim.identify.result import Candidate
 from hmpim.identify.worth import MUCH
 from hmpim.record import Intersample
 
@@ -25,43 +27,21 @@ class Trial:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointFit:
-    """The chosen trial, all others, and the data they were fitted to.
+    """The chosen trial, all others, and the data they were fitted to."""
 
-    Parameters
-    ----------
-    problem : Problem
-        The data under the chosen assumption, with the samples that counted.
-    weighed : Problem
-        The same with the noise whitened, as all trials were compared.
-    best : Trial
-        The chosen one.
-    trials : tuple of Trial
-        All, the chosen one included.
-    forgotten : int
-        Samples omitted at the beginning because the record does not begin at rest: the output
-        there still depends on earlier input.
-    effective_share : float
-        Independent samples per sample, from the best residual's correlation.
-    related : bool
-        Whether the best model explains more than a constant does.
-    silent : bool
-        Whether no model can: the output does not answer the input at all.
-    rivals : tuple of Trial
-        Fits with one more pole, under the chosen assumption, that lose only by its price.
-    hidden : HiddenPole or None
-        The test for one more pole; None if it was not made.
-    """
-
-    problem: Problem
-    weighed: Problem
+    problem: Problem  # the data under the chosen assumption, with the samples that counted
+    weighed: Problem  # the same with the noise whitened, as all trials were compared
     best: Trial
-    trials: tuple[Trial, ...]
+    trials: tuple[Trial, ...]  # all, the chosen one included
+    # samples omitted at the beginning because the record does not begin at rest: the output
+    # there still depends on earlier input
     forgotten: int
-    effective_share: float
-    related: bool
-    silent: bool = False
+    effective_share: float  # independent samples per sample, from the best residual's correlation
+    related: bool  # whether the best model explains more than a constant does
+    silent: bool = False  # whether no model can: the output does not answer the input at all
+    # fits with one more pole, under the chosen assumption, that lose only by its price
     rivals: tuple[Trial, ...] = ()
-    hidden: HiddenPole | None = None
+    hidden: HiddenPole | None = None  # the test for one more pole; None if it was not made
 
     @property
     def lingers(self) -> bool:
@@ -74,6 +54,25 @@ class JointFit:
     def weighed_share(self) -> float:
         """Independent samples per sample of `weighed`: 1 if the noise is whitened."""
         return self.effective_share if self.weighed.noise is None else 1.0
+
+    def with_fit(self, fit: Fit) -> "JointFit":
+        """The same with another fit of the chosen trial."""
+        best = replace(self.best, fit=fit)
+        trials = tuple(best if trial is self.best else trial for trial in self.trials)
+        return replace(self, best=best, trials=trials)
+
+    def candidates(self, percent: Callable[[Fit], float]) -> tuple[Candidate, ...]:
+        """Every trial, the likeliest first; `percent` gives the fit in per cent."""
+        return tuple(
+            Candidate(
+                structure=trial.fit.structure.name,
+                intersample=trial.intersample,
+                criterion=trial.criterion,
+                fit_percent=percent(trial.fit),
+                chosen=trial is self.best,
+            )
+            for trial in sorted(self.trials, key=lambda trial: trial.criterion)
+        )
 
 
 def schwarz(cost: float, count: float, parameters: int) -> float:

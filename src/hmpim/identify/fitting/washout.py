@@ -21,10 +21,7 @@ _SPANS = (0.05, 0.15, 0.5)
 def washed_out(problem: Problem, fit: Fit) -> Fit | None:
     """Fit a plain fit's dynamics with a washout; None if they are not plain.
 
-    Parameters
-    ----------
-    problem, fit : Problem, Fit
-        The data without a drift, and the fit with it.
+    The data are without a drift, the fit with it.
     """
     if fit.structure.name not in PLAIN:
         return None

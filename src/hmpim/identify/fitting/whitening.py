@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hmpim.identify.fitting.data import Counted, Data, Fits, follows, refit_all
+from hmpim.identify.fitting.data import Counted, Data, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import PART, TWICE
+from hmpim.identify.worth import PART
 from hmpim.record import Intersample
 
-__all__ = ["prewhitened_of", "refit_whitened", "weighed_by_noise"]
+__all__ = ["prewhitened_of", "weighed_by_noise"]
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted) -> Data | None:
@@ -24,8 +24,7 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted
     """
     fit = min(fits, key=lambda f: f.objective)
     problem = data.problem(mode, seen)
-    spread = problem.masked(problem.y - problem.y.mean())
-    if fit.cost < PART * float(spread @ spread):
+    if fit.cost < PART * problem.spread:
         return None
     noise = autoregression(fit.residual, seen.valid)
     if noise.size == 1:
@@ -53,9 +52,3 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     if noise.size == 1 and level is None:
         return data.plain
     return replace(data, noise=noise, level=level)
-
-
-def refit_whitened(data: Data, fitted: Fits, seen: Counted) -> Fits:
-    """Refit all fits under one noise model, but only evaluate hopeless ones."""
-    least = min(fit.objective for _, fit in fitted)
-    return refit_all(data, fitted, seen, hopeful=TWICE * least)

@@ -26,7 +26,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM, HALF, LIKELIER, ONE_SIDED
 from hmpim.identify.effects.imperfections import find_imperfections
 from hmpim.identify.fleets.fits import Errors, Fits, errors_of, fitted_all
-from hmpim.identify.fleets.learnt import Fleet, Member, learn_fleet
+from hmpim.identify.fleets.learnt import Fleet, Member
 from hmpim.identify.fleets.pole import with_tails
 from hmpim.identify.judgement.structure import ALMOST
 from hmpim.identify.noise.misfit import misfits
@@ -40,11 +40,9 @@ from hmpim.record import Intersample
 
 __all__ = [
     "Column",
-    "Fleet",
     "FleetFit",
     "Group",
     "fit_fleet",
-    "learn_fleet",
     "parameters_of",
     "widen",
 ]

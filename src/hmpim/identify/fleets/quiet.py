@@ -21,7 +21,8 @@ from hmpim.identify.fitting.beginning import (
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.fitting.halves import halves_of, products_of_halves
 from hmpim.identify.fitting.least_squares import explained
-from hmpim.identify.fleets.fleet import Fleet, Group
+from hmpim.identify.fleets.fleet import Group
+from hmpim.identify.fleets.learnt import Fleet
 from hmpim.identify.judgement.feedback import chances_without_feedback
 from hmpim.identify.judgement.residual import folded_power
 from hmpim.identify.nonlinear.evidence import are_curved

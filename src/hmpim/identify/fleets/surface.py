@@ -40,17 +40,7 @@ def places_in(low: Real, high: Real, degree: int) -> Real:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Surface:
-    """A function on a box, with k values.
-
-    Examples
-    --------
-    >>> low, high = np.array([1.0, 0.0]), np.array([2.0, 0.5])
-    >>> at = places_in(low, high, 8)
-    >>> surface = Surface.fitted(low, high, at, np.exp(at[:, :1] * at[:, 1:]), degree=8)
-    >>> value, slope = surface.at(np.array([[1.5, 0.2]]))
-    >>> bool(abs(value[0, 0] - np.exp(0.3)) < surface.error[0]), bool(surface.error[0] < 1e-6)
-    (True, True)
-    """
+    """A function on a box, with k values."""
 
     low: Real  # (p,): a corner of the box
     high: Real  # (p,): the opposite one

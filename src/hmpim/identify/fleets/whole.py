@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.trial import schwarz
-from hmpim.identify.fleets.fleet import (
-    Column,
-    Fleet,
-    FleetFit,
-    Group,
-    fit_fleet,
-    parameters_of,
-    widen,
-)
-from hmpim.identify.fleets.learnt import is_alike, theta_at
+from hmpim.identify.fleets.fleet import Column, FleetFit, Group, fit_fleet, parameters_of, widen
+from hmpim.identify.fleets.learnt import Fleet, is_alike, theta_at
 from hmpim.identify.fleets.pole import alone_of
 from hmpim.identify.fleets.quiet import are_quiet
 from hmpim.identify.fleets.simpler import Simpler, costs_of, learn_simpler
@@ -35,6 +27,7 @@ from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.mechanisms import LONGEST
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
@@ -54,9 +47,6 @@ from hmpim.model import RationalDelay
 from hmpim.record import Finding
 
 __all__ = ["Whole", "learn_whole", "whole_pairs"]
-
-_LONGEST = 32768
-"""Greatest number of samples that `identify` uses one by one."""
 
 _SPARE = 6
 """Figures that the lines of a stimulus must determine: four of a second-order model, and two."""
@@ -90,7 +80,7 @@ def learn_whole(fleet: Fleet, pairs: Sequence[PairIdentification]) -> Whole | No
     u, fs = fleet.u, fleet.fs
     sweep = sweep_phase(u, fs)
     noise = input_noise(u, fs, band=fleet.band)
-    if u.size > _LONGEST or (sweep is None and find_period(u) is not None):
+    if u.size > LONGEST or (sweep is None and find_period(u) is not None):
         return None
     if 2 * lines_of(u).count < _SPARE or (noise is not None and noise.attenuation > WORTH):
         return None
@@ -202,7 +192,7 @@ def _shapes_of(fleet: Fleet) -> Real:
     values = member.surface.values(place[None])[0]
     alone = alone_of(fleet, member, place, values[:-1] @ member.basis + values[-1])
     mode, fit = member.intersample, alone.best.fit
-    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
+    return bent_shapes(fleet.u, alone.problem, fit, intersample=mode)
 
 
 def _cover_bends(
@@ -232,7 +222,7 @@ def _cover_bends(
         i, j = int(some[k]), int(group.some[some[k]])
         alone = alone_of(fleet, member, group.fit.theta[j], outputs[k])
         mode, fit = member.intersample, alone.best.fit
-        bent = bends(fleet.u, alone.problem, fit, intersample=mode, fs=fleet.fs)
+        bent = bends(fleet.u, alone.problem, fit, intersample=mode)
         if not bent:
             continue
         covered[k] = not bent[0].certain and not group.has_tail(i)

@@ -1,7 +1,7 @@
-"""Several inputs at once: every response of a simultaneous test, direct and coupling.
+"""Several inputs at once: the responses of an output of a simultaneous test to each.
 
-Around each frequency Y_i = Σ_j G_ij U_j + T_i over neighbouring bins, all inputs together, by
-local polynomials and by local rational functions with one denominator for each output:
+Around each frequency Y = Σ_j G_j U_j + T over neighbouring bins, all inputs together, by
+local polynomials and by local rational functions with one denominator:
 Pintelon and Schoukens, System Identification, 2nd ed., Wiley 2012, section 7.3; R. Voorhoeve,
 A. van der Maas and T. Oomen, Mech. Syst. Signal Process. 105, 2018. Sweeps that pass a frequency at
 different times turn their phases differently from bin to bin there, which separates their
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
@@ -37,10 +36,11 @@ from hmpim.identify.frf.rational import (
     read_off,
     solved,
 )
+from hmpim.identify.result import FrequencyResponse
 from hmpim.identify.signals import bins_in, check_band
 from hmpim.identify.worth import PART
 
-__all__ = ["ResponseMatrix", "response_matrix"]
+__all__ = ["JointResponse", "joint_response"]
 
 _ORDER = 2  # of T in polynomial fits
 _TERMS = NUMERATOR + 1
@@ -48,6 +48,8 @@ _TERMS = NUMERATOR + 1
 _IDENTICAL = 1e-6
 _RATIO = 1.6
 _STEPS = 3
+# Most frequencies, spaced by a constant ratio.
+_POINTS = 200
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
 # Condition number up to which inputs count as separated: the worst combination then has ten times
@@ -59,22 +61,16 @@ _FEWEST = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ResponseMatrix:
-    """Frequency responses from m inputs to p outputs, measured at once."""
+class JointResponse:
+    """Frequency responses of one output to m inputs, measured at once."""
 
+    # of each input, at the frequencies where the inputs can be separated. The coherence is partial:
+    # the share that the input explains of the residual of the others, less that of noise
+    inputs: tuple[FrequencyResponse, ...]
     frequency: Real  # (f,): Hz
-    response: Complex  # (f, p, m): output over input, delay included; NaN where not `usable`
-    std: Real  # (f, p, m): √E|error|²; NaN where not `usable`
-    # (f,): condition number of the inputs' spectra over a quarter of the band around, or, if that
-    # is larger, of the error of the responses there: 1 for inputs that have nothing in common,
-    # infinite for identical ones. Inputs are scaled to their own power.
-    condition: Real
-    usable: Mask  # (f,): whether the inputs can be separated
-    # (f, p): share of the output's power in the window that all inputs together explain, less the
+    # (f,): share of the output's power in the window that all inputs together explain, less the
     # share of noise that as many coefficients explain
     multiple_coherence: Real
-    # (f, p, m): share that one input explains of the residual of the others, likewise
-    partial_coherence: Real
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,52 +82,29 @@ class _Joint:
     coherence: Real  # (1, c, m + 1)
 
 
-def response_matrix(
+def joint_response(
     inputs: Real,
-    outputs: Real,
+    y: Real,
     fs: float,
     *,
-    delays: ArrayLike = 0.0,
+    delay: float,
     band: tuple[float, float],
-    valid: Mask | None = None,
-    fill: Real | None = None,
-    points: int = 400,
-    names: Sequence[str] | None = None,
-) -> ResponseMatrix:
-    """Return the responses of all outputs to all inputs of one simultaneous test.
+    valid: Mask | None,
+    fill: Real,
+    names: Sequence[str],
+) -> JointResponse:
+    """Return the responses of an output to all inputs of one simultaneous test.
 
-    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The
-    outputs, (p, n), follow them by delays in s, (p, 1) or (), not negative; rough values suffice.
-    Where an output is not `valid`, (n,) or (p, n), it is taken from `fill`, (p, n), a model's
-    prediction with the bias; both are given, or neither. At most `points` frequencies are spaced by
-    a constant ratio. `names` are those of the inputs, then of the outputs, for messages.
-
-    Raises
-    ------
-    RecordError
-        For inputs that are multiples or sums of others over the whole band: they are named.
-    ArgumentError
-        For an impossible band, or one with too few bins.
-
-    Examples
-    --------
-    >>> t = np.arange(2000) / 200
-    >>> up = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> u = np.stack((up, up[::-1]))
-    >>> y = np.array([[1.0, 0.05], [-0.05, 2.0]]) @ u
-    >>> found = response_matrix(u, y, 200.0, band=(0.5, 20.0))
-    >>> bool(np.nanmax(np.abs(found.response[:, 0, 1] - 0.05)) < 1e-4)
-    True
-    >>> bool(found.usable.all())
-    True
+    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output,
+    (n,), follows them by a delay in s, not negative; a rough value suffices. Where it is not
+    `valid`, (n,), it is taken from `fill`, (n,), a model's prediction with the bias. `names` are
+    those of the inputs, then of the output, for messages. Inputs that are multiples or sums of
+    others over the whole band are refused, and so is a band with too few bins.
     """
-    (m, samples), p = inputs.shape, outputs.shape[0]
+    m, samples = inputs.shape
     check_band(band, fs)
-    numbered = [*(f"input {k}" for k in range(m)), *(f"output {k}" for k in range(p))]
-    labels = tuple(numbered if names is None else names)
-    late = np.broadcast_to(np.asarray(delays, dtype=np.float64), (p, 1))
-    y, share = _filled(outputs, valid, fill, labels[m:])
-    base = int(np.floor(late.min() * fs + 1e-9))
+    y, share = _filled(y, valid, fill, names[-1])
+    base = int(np.floor(delay * fs + 1e-9))
     step = fs / (samples - base)
     bins = (samples - base - 1) // 2 + 1
     low, high = bins_in(band, step, bins)
@@ -140,61 +113,53 @@ def response_matrix(
             f"band is ({band[0]:g}, {band[1]:g}) Hz and holds {max(high - low + 1, 0)} bins of "
             f"{step:g} Hz, too few for {m} inputs; give a wider band or a longer record"
         )
-    _refuse_identical(inputs, low, high, labels[:m])
-    centre = centres_in_band(low, high, points)
-    moved = [_moved(inputs, own, fs, base) for own in late[:, 0].tolist()]
-    each = [_chosen(u, own, base, centre) for u, own in zip(moved, y, strict=True)]
-    response, variance, conditions, coherence = (
-        np.stack(parts, axis=1) for parts in zip(*each, strict=True)
-    )
+    _refuse_identical(inputs, low, high, names[:-1])
+    centre = centres_in_band(low, high, _POINTS)
+    moved = _moved(inputs, delay * fs, base)
+    response, variance, condition, coherence = _chosen(moved, y[base:], centre)
     frequency = centre * step
-    condition = np.maximum(_input_condition(moved[0], centre), conditions.max(axis=1))
-    usable = condition <= _WORST
-    response = response * np.exp(-2j * np.pi * frequency[:, None, None] * late)
+    usable = np.maximum(_input_condition(moved, centre), condition) <= _WORST
+    response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
     # Filled samples have no residual and add no information: both raise the error.
-    std = np.sqrt(variance) / share[:, None]
-    response[~usable] = complex(np.nan, np.nan)
-    std[~usable] = np.nan
-    return ResponseMatrix(
+    std = np.sqrt(variance) / share
+    return JointResponse(
+        inputs=tuple(
+            FrequencyResponse(
+                frequency=frequency[usable],
+                response=response[usable, j],
+                std=std[usable, j],
+                coherence=coherence[usable, j],
+            )
+            for j in range(m)
+        ),
         frequency=frequency,
-        response=response,
-        std=std,
-        condition=condition,
-        usable=usable,
-        multiple_coherence=coherence[:, :, -1],
-        partial_coherence=coherence[:, :, :-1],
+        multiple_coherence=coherence[:, -1],
     )
 
 
-def _filled(
-    y: Real, valid: Mask | None, fill: Real | None, labels: tuple[str, ...]
-) -> tuple[Real, Real]:
-    """Outputs with their gaps filled, (p, n), and the share of each that was measured, (p,)."""
-    if valid is None or fill is None:
-        return y, np.ones(y.shape[0])
-    mask = np.broadcast_to(valid, y.shape)
-    for counts, label in zip(mask, labels, strict=True):
-        if (measured := int(np.count_nonzero(counts))) < _FEWEST:
-            raise RecordError(
-                f"{label} has {measured} valid samples; at least {_FEWEST} are needed"
-            )
-    return np.where(mask, y, fill), np.asarray(mask.mean(axis=1))
+def _filled(y: Real, valid: Mask | None, fill: Real, name: str) -> tuple[Real, float]:
+    """An output with its gaps filled, (n,), and the share of it that was measured."""
+    if valid is None:
+        return y, 1.0
+    if (measured := int(np.count_nonzero(valid))) < _FEWEST:
+        raise RecordError(f"{name} has {measured} valid samples; at least {_FEWEST} are needed")
+    return np.where(valid, y, fill), float(valid.mean())
 
 
-def _refuse_identical(u: Real, low: int, high: int, labels: tuple[str, ...]) -> None:
+def _refuse_identical(u: Real, low: int, high: int, names: Sequence[str]) -> None:
     """Refuse inputs that are multiples or sums of others over the band, and name them."""
     spectra = scipy.fft.rfft(u, axis=1)[:, low : high + 1]
     size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=1))
     if np.any(size == 0):
         raise RecordError(
-            f"{labels[int(np.argmin(size))]} has nothing in the band; give a band that it excites"
+            f"{names[int(np.argmin(size))]} has nothing in the band; give a band that it excites"
         )
     spectra = spectra / size[:, None]
     vectors, values, _ = np.linalg.svd(spectra, full_matrices=False)
     if values[-1] > _IDENTICAL * values[0]:
         return
     share = np.abs(vectors[:, -1])
-    same = [label for label, s in zip(labels, share, strict=True) if s > PART * share.max()]
+    same = [name for name, s in zip(names, share, strict=True) if s > PART * share.max()]
     raise RecordError(
         f"{', '.join(same)} move alike over the whole band, but for a factor, so their responses "
         "cannot be distinguished; drive them one at a time, or with sweeps that pass each "
@@ -215,21 +180,19 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
     return np.asarray(ratio)[windows.near]
 
 
-def _moved(u: Real, late: float, fs: float, base: int) -> Complex:
-    """Transforms of the inputs, delayed as the responses to them are, less `base` samples."""
-    length, lag = u.shape[1] - base, int(np.floor(late * fs + 1e-9)) - base
-    # An input is at rest before the record.
-    moved = np.concatenate([np.repeat(u[:, :1], lag, axis=1), u[:, : length - lag]], axis=1)
+def _moved(u: Real, late: float, base: int) -> Complex:
+    """Transforms of the inputs, delayed by what a delay in samples has beyond `base` whole ones."""
+    length = u.shape[1] - base
     count = (length - 1) // 2 + 1
-    turn = np.exp(-2j * np.pi * ((late * fs - (lag + base)) * np.arange(count)) / length)
-    spectra: Complex = np.asarray(scipy.fft.rfft(moved, axis=1))[:, :count] * turn
+    turn = np.exp(-2j * np.pi * ((late - base) * np.arange(count)) / length)
+    spectra: Complex = np.asarray(scipy.fft.rfft(u[:, :length], axis=1))[:, :count] * turn
     spectra[:, 0] = 0.0
     return spectra
 
 
-def _chosen(u: Complex, y: Real, base: int, centre: Integer) -> tuple[Complex, Real, Real, Real]:
+def _chosen(u: Complex, y: Real, centre: Integer) -> tuple[Complex, Real, Real, Real]:
     """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1)."""
-    spectrum = np.array(scipy.fft.rfft(y[base:]))[: u.shape[1]]
+    spectrum = np.array(scipy.fft.rfft(y))[: u.shape[1]]
     spectrum[0] = 0.0
     widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
     polynomials = [fit for width in widths for fit in _fits(u, spectrum, centre, width, None)]

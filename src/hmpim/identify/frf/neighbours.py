@@ -18,6 +18,8 @@ from hmpim.identify.kept import kept
 from hmpim.identify.signals import whole_lag
 
 __all__ = [
+    "NOTHING",
+    "RIDGE",
     "WIDEST",
     "Integer",
     "LocalFit",
@@ -34,6 +36,12 @@ _LONG = 100_000
 
 WIDEST = 1000
 """Most bins on either side in a window of polynomials."""
+
+RIDGE = 1e-13
+"""Share of each diagonal element that is added to normal equations."""
+
+NOTHING = 1e-24
+"""Power of U, over its greatest, that counts as zero."""
 
 Integer = NDArray[np.int64]
 

@@ -11,14 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.frf.neighbours import LocalFit, Spectra, Windows, mirrored, windows_around
+from hmpim.identify.frf.neighbours import (
+    NOTHING,
+    RIDGE,
+    LocalFit,
+    Spectra,
+    Windows,
+    mirrored,
+    windows_around,
+)
 from hmpim.identify.kept import kept
 
 __all__ = ["polynomial_fits"]
 
-_RIDGE = 1e-13
-# Power of U, over its greatest, that counts as zero.
-_NOTHING = 1e-24
 # Products of bins in memory at once, about 80 MB.
 _CHUNK = 1_000_000
 
@@ -97,7 +102,7 @@ def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], orde
     counted = np.concatenate([each.counted for each in windows])
     # G's columns are scaled to the size of T's, in any unit of U; without any U, G is zero with a
     # huge error.
-    size = np.sqrt(np.maximum(squares[:, 0].real / counted, _NOTHING * float(np.max(power))))
+    size = np.sqrt(np.maximum(squares[:, 0].real / counted, NOTHING * float(np.max(power))))
     pair = np.add.outer(np.arange(terms), np.arange(terms))
     gram = np.empty((size.size, 2 * terms, 2 * terms), dtype=np.complex128)
     gram[:, :terms, :terms] = squares[:, pair] / (size**2)[:, None, None]
@@ -107,7 +112,7 @@ def _solver(u: Complex, centre: NDArray[np.int64], widths: tuple[int, ...], orde
     gram[:, terms:, terms:] = ones[:, pair]
     counts = [each.start.size for each in windows]
     bins = np.repeat([each.size for each in windows], counts)
-    gram.reshape(bins.size, -1)[:, :: 2 * terms + 1] += _RIDGE * bins[:, None]
+    gram.reshape(bins.size, -1)[:, :: 2 * terms + 1] += RIDGE * bins[:, None]
     first = np.cumsum([0, *counts[:-1]])
     near = np.stack([each.near for each in windows]) + first[:, None]
     here = np.stack([x[each.place] for each, x in zip(windows, powers, strict=True)])

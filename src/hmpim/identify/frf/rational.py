@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.frf.columns import DENOMINATOR_ORDER, Columns
 from hmpim.identify.frf.neighbours import (
+    NOTHING,
+    RIDGE,
     Integer,
     LocalFit,
     Spectra,
@@ -49,8 +51,6 @@ TRANSIENT_ORDER = 3
 """One more than B's: a sampled transient is a polynomial in z, not in jω."""
 
 _STEPS = 4
-_NOTHING = 1e-24
-_RIDGE = 1e-13
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,7 +119,7 @@ class Regressors:
         """
         u = np.atleast_2d(u)
         windows = windows_around(centre, u.shape[-1], width)
-        floor = _NOTHING * float(np.max(np.abs(u)) ** 2)
+        floor = NOTHING * float(np.max(np.abs(u)) ** 2)
         inputs = windows.views(mirrored(u, width), width)
         power = np.sum(np.abs(inputs) ** 2, axis=2) / windows.counted[:, None]
         power = np.maximum(power, floor)
@@ -198,7 +198,7 @@ def _scaled(gram: Complex) -> tuple[Complex, Real]:
     scale = 1.0 / np.sqrt(np.maximum(gram.diagonal(axis1=-2, axis2=-1).real, 1e-300))
     scaled = gram * (scale[..., :, None] * scale[..., None, :])
     diagonal = np.arange(q)
-    scaled[..., diagonal, diagonal] += _RIDGE * q
+    scaled[..., diagonal, diagonal] += RIDGE * q
     return scaled, scale
 
 

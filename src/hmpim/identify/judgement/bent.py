@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS
 from hmpim.identify.reading.figures import figures_of
 from hmpim.identify.reading.spanned import bent_figures
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.groups import MODELLED, SIZES, in_words
 from hmpim.identify.worth import FEW, MATERIAL
+from hmpim.model.nonlinear import KIND_WORDS
 from hmpim.record import Finding
 
 __all__ = ["bent", "gain_change"]

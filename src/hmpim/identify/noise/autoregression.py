@@ -47,13 +47,6 @@ def autoregression(residual: Real, valid: Mask | None) -> Real:
     """Filter that whitens a residual, (n,), of zero mean; 1 first, shape (order + 1,).
 
     Samples that are not `valid` do not count.
-
-    Examples
-    --------
-    >>> from scipy.signal import lfilter
-    >>> noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(5000))
-    >>> autoregression(noise, None)[:2].round(2).tolist()
-    [1.0, -0.9]
     """
     longest = min(LONGEST, residual.size // 20)
     if valid is not None:  # enough samples must remain between the gaps
@@ -152,14 +145,6 @@ def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
 
     The residual, (n,), is 0 where a sample does not count. The order is at most `longest`, and a
     tenth of the number of samples.
-
-    Examples
-    --------
-    >>> from scipy.signal import lfilter
-    >>> noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(0).standard_normal(5000))
-    >>> whitening, power = yule_walker(noise)
-    >>> whitening[:2].round(2).tolist(), round(power, 1)
-    ([1.0, -0.9], 1.0)
     """
     gram = scipy.linalg.toeplitz(autocovariance(residual, min(longest, residual.size // 10)))
     noise = whitening_filter(gram, residual.size)
@@ -191,12 +176,6 @@ def deviation_of_mean(residual: Real, counted: int) -> float:
     The variance of a mean is the power at half a bin over the number of samples. Only the lowest
     bins determine that power: given the kind of noise, the mean follows Student's t, and the kinds
     are averaged by their likelihood. The noise has zero mean.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).standard_normal(5000)
-    >>> round(deviation_of_mean(noise, 5000) * 5000**0.5, 1)
-    1.3
     """
     weights, kinds = _kinds(residual, *yule_walker(residual), np.array([0.5]))
     spread = np.sqrt(kinds[:, 0] / counted)

@@ -52,12 +52,6 @@ def noise_colour(residual: Real, fs: float) -> NoiseColour:
 
     Coloured noise is AR(1) or a power law, the likelier of the two, each fitted by Whittle's
     likelihood (P. Whittle, Arkiv för Matematik 2, 1953).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> noise_colour(np.random.default_rng(0).standard_normal(2000), 200.0).kind
-    'white'
     """
     e = residual - residual.mean()
     n = e.size

@@ -30,11 +30,6 @@ def autocovariance(residual: Real, lags: int, spectra: Complex | None = None) ->
     """Biased autocovariance of residuals, (..., n), at lags 0..lags, shape (..., lags + 1).
 
     `spectra`, (..., n // 2 + 1), are their transforms, if known.
-
-    Examples
-    --------
-    >>> autocovariance(np.array([1.0, -1.0, 1.0, -1.0]), 1).round(6).tolist()
-    [1.0, -0.75]
     """
     n = residual.shape[-1]
     if spectra is not None:
@@ -67,12 +62,6 @@ def is_steady(residual: Real) -> bool:
 
     The squares of noise that is louder for a while, or where the output moves fast, are
     correlated (J. Time Series Anal. 4). Samples of 0 do not count.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).standard_normal(1000)
-    >>> is_steady(noise), is_steady(noise * np.linspace(0.2, 2.0, 1000))
-    (True, False)
     """
     return not _correlated(np.where(residual != 0.0, squares_of(residual) - 1.0, 0.0))
 

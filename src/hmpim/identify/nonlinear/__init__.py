@@ -8,5 +8,7 @@ lines                 distortion at the unexcited lines of a periodic input
 mechanisms            friction, backlash, rate limit, hard and soft springs
 evidence              which of them the record supports
 bends                 how far a nonlinearity moves a linear fit
+modelled              a nonlinearity as part of the model
+rows                  its row in the fit, from the model
 speed                 a command that is followed at a limited speed
 """

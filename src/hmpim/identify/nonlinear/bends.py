@@ -29,11 +29,11 @@ from hmpim.identify.nonlinear.mechanisms import (
     LONGEST_AUTOREGRESSION,
     RATES,
     Hypothesis,
-    Kind,
     hypotheses,
     stretch_of,
 )
 from hmpim.identify.worth import MATERIAL, PART, WORTH
+from hmpim.model.nonlinear import Kind
 from hmpim.model.operators import rate_limited
 from hmpim.model.poles import rational_response
 from hmpim.model.sampled import prepare_input
@@ -87,31 +87,19 @@ class Bend:
 
 @kept
 def bends(
-    u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float, floor: float = 0.0
+    u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, floor: float = 0.0
 ) -> tuple[Bend, ...]:
     """Find the kinds of nonlinearity that the record does not exclude, the likeliest first.
 
     None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
     nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
-    its noise, `fs` is in Hz. Effects up to `floor` are ignored, the r.m.s. error of rounding.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model import STRUCTURES
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = u - np.clip(u, -0.1, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> best = bends(u, data, fit, intersample="foh", fs=100.0)[0]
-    >>> best.kind, best.certain, abs(fit.linear + best.moved[1:]).round(2).tolist()
-    ('dead_zone', True, [1.0, 0.0])
+    its noise. Effects up to `floor` are ignored, the r.m.s. error of rounding.
     """
     given = fit
     u, problem, fit = _shortened(u, problem, fit, intersample)
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0.0:
         return ()
-    tried = _tried(u, fit, intersample, fs)
+    tried = _tried(u, fit, intersample)
     traces = np.stack([hypothesis.trace for hypothesis in tried])
     if problem.valid is not None:  # a trace outside the valid samples is only rounding inside
         inside = traces[:, problem.valid]
@@ -153,7 +141,6 @@ def is_bent_instead(
     plain: Fit,
     *,
     intersample: Intersample,
-    fs: float,
     floor: float = 0.0,
 ) -> bool:
     """Whether a plain fit with one nonlinearity explains more than a rich fit, with or without one.
@@ -162,18 +149,18 @@ def is_bent_instead(
     """
     if fit.cost < PART * plain.cost:  # no kind explains as much
         return False
-    bent = bends(u, problem, plain, intersample=intersample, fs=fs, floor=floor)
+    bent = bends(u, problem, plain, intersample=intersample, floor=floor)
     if not bent or not bent[0].certain or fit.cost <= 0.0:
         return False
     gained = 0.5 * problem.counted * float(np.log(plain.cost / fit.cost))
     if bent[0].gain <= gained:
         return False
-    own = bends(u, problem, fit, intersample=intersample, fs=fs, floor=floor)
+    own = bends(u, problem, fit, intersample=intersample, floor=floor)
     return bent[0].gain > gained + (own[0].gain if own else 0.0)
 
 
 def plainer_bends(
-    u: Real, joint: JointFit, plain: Fit | None, *, fs: float, floor: float = 0.0
+    u: Real, joint: JointFit, plain: Fit | None, *, floor: float = 0.0
 ) -> tuple[Bend, ...]:
     """Find the kinds that make a plain fit about as likely as the rich one chosen.
 
@@ -188,21 +175,19 @@ def plainer_bends(
     count = problem.counted * joint.weighed_share
     fewer = best.fit.structure.parameters - plain.structure.parameters - 1
     behind = count * np.log(plain.objective / best.fit.objective) - fewer * np.log(count)
-    found = bends(u, problem, plain, intersample=best.intersample, fs=fs, floor=floor)
+    found = bends(u, problem, plain, intersample=best.intersample, floor=floor)
     return tuple(
         replace(bend, white=False) for bend in found if behind - 2.0 * bend.gain < 2.0 * CLEARLY
     )
 
 
-def bent_shapes(
-    u: Real, problem: Problem, fit: Fit, *, intersample: Intersample, fs: float
-) -> Real:
+def bent_shapes(u: Real, problem: Problem, fit: Fit, *, intersample: Intersample) -> Real:
     """Traces of all kinds in white noise, less what a linear change of the fit explains, (k, n).
 
     Each has a sum of squares of 1. Half the square of its product with a residual of unit variance
     is the log-likelihood that it gains, if the product is positive.
     """
-    traces = np.stack([hypothesis.trace for hypothesis in _tried(u, fit, intersample, fs)])
+    traces = np.stack([hypothesis.trace for hypothesis in _tried(u, fit, intersample)])
     slopes = jacobian(problem, fit)
     rest = traces - traces @ np.linalg.pinv(slopes) @ slopes
     power = np.vecdot(rest, rest)
@@ -210,11 +195,11 @@ def bent_shapes(
     return np.asarray(rest[distinct] / np.sqrt(power[distinct, None]))
 
 
-def _tried(u: Real, fit: Fit, intersample: Intersample, fs: float) -> list[Hypothesis]:
+def _tried(u: Real, fit: Fit, intersample: Intersample) -> list[Hypothesis]:
     """Every kind, with the values to try."""
     return [
-        *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, fs, every=_EVERY),
-        *_at_the_input(u, fit, intersample, fs),
+        *hypotheses(fit.prediction - fit.linear[-1], fit.denominator, every=_EVERY),
+        *_at_the_input(u, fit, intersample),
     ]
 
 
@@ -244,7 +229,7 @@ def _shortened(
     return u[here], part, own
 
 
-def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Iterator[Hypothesis]:
+def _at_the_input(u: Real, fit: Fit, intersample: Intersample) -> Iterator[Hypothesis]:
     """Traces in the output of a dead zone or a rate limit of the command."""
     largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
     inside = [-np.clip(u, -half * largest, half * largest) for half in _DEAD]
@@ -258,10 +243,8 @@ def _at_the_input(u: Real, fit: Fit, intersample: Intersample, fs: float) -> Ite
     )
     if fit.structure.integrators:
         traces += fit.linear[0] * first * np.maximum(np.arange(u.size) - fit.delay, 0.0)
-    for trace in traces[: len(inside)]:
-        yield Hypothesis(kind="dead_zone", trace=trace)
-    for rate, trace in zip(rates, traces[len(inside) :], strict=True):
-        yield Hypothesis(kind="rate_limit", trace=trace, size=rate * fastest * fs)
+    for i, trace in enumerate(traces):
+        yield Hypothesis(kind="dead_zone" if i < len(inside) else "rate_limit", trace=trace)
 
 
 def _scored(slopes: Real, traces: Real, residual: Real) -> tuple[Real, Real, Real]:

@@ -20,7 +20,7 @@ from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, co
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
-__all__ = ["Outcome", "Subject", "are_curved", "better_of", "inspect_fit"]
+__all__ = ["Outcome", "Subject", "are_curved", "criterion_of", "inspect_fit"]
 
 _BLOCK = 16_384
 """Samples whose products are summed at once: they fit into a processor's cache."""
@@ -143,13 +143,8 @@ def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, .
     return tuple(m for m in kinds if m.likelihood > first.likelihood - behind(m))
 
 
-def better_of(subject: Subject, rich: Outcome, plain: Outcome) -> Outcome:
-    """The fit that, with its likeliest kind, explains more by Schwarz's criterion."""
-    return min(rich, plain, key=lambda outcome: _criterion(subject, outcome))
-
-
-def _criterion(subject: Subject, outcome: Outcome) -> float:
-    """Bayesian criterion of a linear fit, with its likeliest kind if there is any."""
+def criterion_of(subject: Subject, outcome: Outcome) -> float:
+    """Schwarz's criterion of a linear fit, with its likeliest kind if there is any."""
     e = thinned(outcome.fit.residual, subject.block)
     unknown, cost = outcome.fit.structure.parameters, float(e @ e)
     if outcome.named and outcome.named[0].trace.size == e.size:

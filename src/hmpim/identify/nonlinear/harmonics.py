@@ -24,20 +24,18 @@ from hmpim.identify.nonlinear.harmonic_regression import (
     view_of,
 )
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase
+from hmpim.identify.result import HarmonicCurve
 
 __all__ = ["Harmonic", "Harmonics", "any_harmonics", "sweep_harmonics"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Harmonic:
-    """One order; amplitudes are in the residual's unit."""
+    """One order."""
 
-    order: int  # multiple of the sweep's frequency
-    rms: float  # over the sweep, without the noise
+    curve: HarmonicCurve  # along the sweep, at places that the order reaches
+    rms: float  # over the sweep, without the noise, in the residual's unit
     probability: float  # chance that noise alone produces as much or more
-    frequency: tuple[float, ...]  # Hz, of the sweep itself, at places that the order reaches
-    amplitude: tuple[float, ...]  # of the harmonic at these places
-    std: tuple[float, ...]  # standard deviation of the amplitude
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,11 +49,11 @@ class Harmonics:
 
     def rms(self, parity: int) -> float:
         """R.m.s. of all even (0) or odd (1) orders together."""
-        return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.order % 2 == parity)))
+        return float(np.sqrt(sum(h.rms**2 for h in self.orders if h.curve.order % 2 == parity)))
 
     def probability(self, parity: int) -> float:
         """Chance that noise makes the even (0) or odd (1) orders, corrected for their number."""
-        chances = [h.probability for h in self.orders if h.order % 2 == parity]
+        chances = [h.probability for h in self.orders if h.curve.order % 2 == parity]
         return min(1.0, len(chances) * min(chances, default=1.0))
 
 
@@ -72,16 +70,6 @@ def sweep_harmonics(
     The residual, (n,), is output less prediction, 0 where a sample does not count; `fs` is in Hz.
     The harmonics arrive later than the sweep by the system's delay, in s. What follows the sweeps
     of other inputs is no harmonic of this one.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> found = sweep_harmonics(0.1 * (u**3 - 0.75 * u) + noise, sweep_phase(u, 200.0), 200.0)
-    >>> [h.order for h in found.orders if h.probability < 1e-4], round(found.rms(1), 3)
-    ([3], 0.017)
     """
     view = view_of(residual, sweep, fs, delay)
     if view is None:
@@ -94,16 +82,6 @@ def any_harmonics(residuals: Real, sweep: SweepPhase, fs: float, *, delay: float
 
     It takes a tenth of the work of `sweep_harmonics`, and holds only for white residuals. The delay
     in s is rounded to a sample, which turns the harmonics of a stretch but keeps their size.
-
-    Examples
-    --------
-    >>> from hmpim.identify.nonlinear.sweep_phase import sweep_phase
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> two = np.stack((noise, 0.01 * u**2 + noise))
-    >>> (any_harmonics(two, sweep_phase(u, 200.0), 200.0, delay=0.0) > 0.01).tolist()
-    [True, False]
     """
     chances = np.ones(residuals.shape[0])
     view = view_of(np.ones(residuals.shape[1]), sweep, fs, np.rint(delay * fs) / fs)
@@ -146,16 +124,14 @@ def _tested(fit: HarmonicFit, fs: float) -> Harmonics:
         reached = fit.used[at] & fit.used[at + 1] & (k * frequency < 0.5 * HIGHEST * fs)
         spread = 0.5 * (fit.covariance[at, at] + fit.covariance[at + 1, at + 1])
         chance = scipy.special.fdtrc(group.size, fit.freedom, statistic / group.size)
-        found.append(
-            Harmonic(
-                order=k,
-                rms=float(np.sqrt(power)),
-                probability=float(chance),
-                frequency=tuple(frequency[reached].tolist()),
-                amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
-                std=tuple(np.sqrt(spread[reached]).tolist()),
-            )
+        curve = HarmonicCurve(
+            order=k,
+            frequency=tuple(frequency[reached].tolist()),
+            amplitude=tuple(np.hypot(fit.weights[at], fit.weights[at + 1])[reached].tolist()),
+            std=tuple(np.sqrt(spread[reached]).tolist()),
         )
+        rms = float(np.sqrt(power))
+        found.append(Harmonic(curve=curve, rms=rms, probability=float(chance)))
     degrees = max(fit.rest.size - int(np.count_nonzero(fit.used)), 1)
     return Harmonics(
         orders=tuple(found[1:]),

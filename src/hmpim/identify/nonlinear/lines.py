@@ -36,15 +36,7 @@ class LineLevel:
 
 
 def find_period(u: Real) -> int | None:
-    """Samples after which an input, (n,), repeats exactly; None unless the record has two periods.
-
-    Examples
-    --------
-    >>> find_period(np.tile(np.random.default_rng(0).standard_normal(100), 3))
-    100
-    >>> find_period(np.random.default_rng(0).standard_normal(300)) is None
-    True
-    """
+    """Samples after which an input, (n,), repeats exactly; None without two periods."""
     x = u - u.mean()
     n = x.size
     power = np.concatenate([[0.0], np.cumsum(x**2)])
@@ -68,15 +60,6 @@ def detection_lines(u: Real, y: Real, *, period: int) -> tuple[LineLevel, ...]:
 
     Input and output, (n,), are in the steady state over two periods or more; the last whole ones
     count. The period is in samples.
-
-    Examples
-    --------
-    >>> k, t = np.array([1, 3, 7, 9, 13]), np.arange(3000) / 1000
-    >>> u = np.sum(np.cos(2 * np.pi * k[:, None] * t + k[:, None] ** 2), axis=0)
-    >>> y = u + 0.01 * u**2 + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> found = detection_lines(u, y, period=1000)
-    >>> [level.parity for level in found if level.probability < 1e-3]
-    ['even']
     """
     periods = u.size // period
     start = u.size - periods * period

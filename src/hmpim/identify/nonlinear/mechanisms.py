@@ -34,17 +34,15 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.nonlinear.harmonic_regression import HarmonicFit
-from hmpim.model.nonlinear import KIND_WORDS, Kind
+from hmpim.model.nonlinear import Kind
 from hmpim.model.operators import play, pushed, rate_limited, reversals
 
 __all__ = [
     "GAPS",
-    "KIND_WORDS",
     "LONGEST",
     "LONGEST_AUTOREGRESSION",
     "RATES",
     "Hypothesis",
-    "Kind",
     "Mechanism",
     "compare_harmonics",
     "compare_mechanisms",
@@ -121,19 +119,6 @@ def compare_mechanisms(problem: Problem, fit: Fit, *, fs: float) -> tuple[Mechan
     """Fit each kind of nonlinearity to the residual of a linear fit, the likeliest first.
 
     Each kind whose weight has the right sign is returned once; `fs` is the rate in Hz.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model.sampled import prepare_input
-    >>> from hmpim.model import STRUCTURES
-    >>> u = np.sin(np.arange(3000) / 30 * (1 + np.arange(3000) / 3000))
-    >>> y = play(u, 0.1) + 0.01 * np.random.default_rng(0).standard_normal(3000)
-    >>> data = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> best = compare_mechanisms(data, fit, fs=100.0)[0]
-    >>> best.kind, round(best.size, 1)
-    ('backlash', 0.1)
     """
     if not np.any(fit.residual) or np.ptp(fit.prediction) == 0:
         return ()
@@ -211,12 +196,14 @@ def _background(problem: Problem, fit: Fit, here: slice) -> Real:
     return np.asarray((vectors[:, keep] / np.sqrt(values[keep])).T @ stacked)
 
 
-def hypotheses(x: Real, denominator: Real, fs: float, *, every: int = 1) -> Iterator[Hypothesis]:
+def hypotheses(
+    x: Real, denominator: Real, fs: float = 1.0, *, every: int = 1
+) -> Iterator[Hypothesis]:
     """Every kind with every value to try.
 
     `x`, (n,), is the linear model's output less its bias; the denominator, by rising powers of s
-    per sample, is of the dynamics that a force acts on; `fs` is the rate in Hz. With `every` = 3,
-    the middle value of each three is tried.
+    per sample, is of the dynamics that a force acts on. With `fs` in Hz, speeds are per second.
+    With `every` = 3, the middle value of each three is tried.
     """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)

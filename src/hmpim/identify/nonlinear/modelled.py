@@ -19,14 +19,14 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.bends import bends
-from hmpim.identify.nonlinear.fine import linear_part
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Kind
+from hmpim.identify.nonlinear.mechanisms import LONGEST
 from hmpim.identify.nonlinear.rows import (
     TURNS,
     Command,
-    Nonlinearity,
+    NonlinearRow,
     dead_zone,
     first_rows,
+    linear_part,
     with_row,
 )
 from hmpim.identify.result import Estimate
@@ -34,7 +34,7 @@ from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
 from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, StructureName
-from hmpim.model.nonlinear import NonlinearPart
+from hmpim.model.nonlinear import KIND_WORDS, Kind, NonlinearPart
 from hmpim.record import Finding
 
 __all__ = [
@@ -42,7 +42,7 @@ __all__ = [
     "Modelled",
     "described",
     "is_explained",
-    "is_noise",
+    "is_rounding",
     "kinds_in_question",
     "leaves_noise",
     "linear_starts",
@@ -67,12 +67,6 @@ _FEWEST = 100
 class Modelled:
     """A nonlinearity that is part of the model."""
 
-    kind: Kind
-    # Half of the gap of backlash, or the deflection at which the restoring force equals friction,
-    # in the output's unit; half the width of a dead zone in the input's. Otherwise the share by
-    # which the force, or the output, at the largest deflection departs from proportion.
-    size: float
-    std: float  # standard deviation of the size
     trend: Real  # (n,): its effect on the output
     waits: Mask | None  # (n,): samples that do not depend on the linear part
     part: NonlinearPart  # what a model needs of it
@@ -80,8 +74,8 @@ class Modelled:
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
-        unit = units[_UNIT[self.kind]] if self.kind in _UNIT else ""
-        return estimate(self.size, self.std**2, unit=unit)
+        unit = units[_UNIT[self.part.kind]] if self.part.kind in _UNIT else ""
+        return estimate(self.part.size, self.part.std**2, unit=unit)
 
     def as_measured(self, joint: JointFit) -> tuple[Problem, Fit]:
         """The output with the nonlinearity, and the linear part, which leaves it over."""
@@ -98,17 +92,17 @@ _UNIT: dict[Kind, int] = {"dead_zone": 0, "backlash": 1, "friction": 1}
 """Whose unit a size has: the input's or the output's; others are shares."""
 
 
-def is_explained(u: Real, joint: JointFit, *, fs: float, floor: float) -> bool:
+def is_explained(u: Real, joint: JointFit, *, floor: float) -> bool:
     """Whether no nonlinearity need be sought: plain dynamics leave white noise without a trace.
 
-    The input has shape (n,), `fs` is in Hz; effects up to `floor` are rounding errors (r.m.s.).
+    The input has shape (n,); effects up to `floor` are rounding errors (r.m.s.).
     """
     best, fit = joint.best, joint.best.fit
     if fit.structure.sampled or joint.problem.y.size > LONGEST:
         return True
     if fit.structure.name not in PLAIN or not is_white(joint.problem.counting(fit.residual)):
         return False
-    seen = bends(u, joint.weighed, fit, intersample=best.intersample, fs=fs, floor=floor)
+    seen = bends(u, joint.weighed, fit, intersample=best.intersample, floor=floor)
     return not any(bend.matters for bend in seen)
 
 
@@ -152,7 +146,7 @@ def kinds_in_question(
     for fit in starts:
         if best.cost < PART**2 * fit.cost:
             continue
-        seen = bends(command.u, problem, fit, intersample=command.intersample, fs=1.0)
+        seen = bends(command.u, problem, fit, intersample=command.intersample)
         kinds = [one.kind for one in seen if one.certain]
         if fit.structure.name in _SERVOS:
             alike = any(kind in ALIKE for kind in kinds)
@@ -168,13 +162,11 @@ def kinds_in_question(
 
 def settled_rows(
     kind: Kind, command: Command, problem: Problem, start: Fit
-) -> Iterator[Nonlinearity]:
+) -> Iterator[NonlinearRow]:
     """Rows of a kind, each from a fit of the same structure that agrees with it.
 
     The data are without a row, and `start` is a linear fit to them. Not every kind has a row.
     """
-    if start.structure.name in _SERVOS and kind != "friction":
-        return
     if kind == "dead_zone":
         found = dead_zone(command, problem, start)
         if found is not None:
@@ -185,7 +177,7 @@ def settled_rows(
             yield replace(found, between=command.intersample)
 
 
-def _in_turns(one: Nonlinearity, problem: Problem, start: Fit) -> Nonlinearity | None:
+def _in_turns(one: NonlinearRow, problem: Problem, start: Fit) -> NonlinearRow | None:
     """The row and the fit, each from the other until both agree; None if they do not.
 
     They agree where the fit gains nothing that an error bar shows.
@@ -239,17 +231,12 @@ def _ahead(tried: list[Real], changes: list[Real]) -> Real:
     return np.asarray(last - weights @ (moves + differences))
 
 
-def is_noise(problem: Problem, fit: Fit, rounding: float) -> bool:
-    """Whether a residual is white, or mostly rounding error, of which `rounding` is the r.m.s."""
-    return is_rounding(problem, fit, rounding) or fit.is_white
-
-
 def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
-    """Whether most of a residual is rounding error, which a slow motion colours."""
+    """Whether most of a residual is rounding error, of that r.m.s.; a slow motion colours it."""
     return fit.cost < TWICE * problem.counted * rounding**2
 
 
-def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
+def leaves_noise(joint: JointFit, one: NonlinearRow, rounding: float) -> bool:
     """Whether a fit leaves noise, also at samples that do not depend on the linear part.
 
     Rounding may look like an effect that is smaller than itself.
@@ -264,7 +251,7 @@ def leaves_noise(joint: JointFit, one: Nonlinearity, rounding: float) -> bool:
     return fit.is_white and is_white(every)
 
 
-def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, Real]:
+def described(joint: JointFit, one: NonlinearRow, fs: float) -> tuple[Modelled, Real]:
     """The nonlinearity as the fit with its row, the last of its rows, has it, at `fs` in Hz.
 
     The second value is the covariance of the fit's parameters, (p, p). The fit holds the row fixed:
@@ -302,11 +289,11 @@ def described(joint: JointFit, one: Nonlinearity, fs: float) -> tuple[Modelled, 
         between=one.between,
         lag=one.lag / fs,
     )
-    found = Modelled(kind=kind, size=size, std=std, trend=size * row, waits=waits, part=part)
+    found = Modelled(trend=size * row, waits=waits, part=part)
     return found, np.asarray(own[:-1, :-1])
 
 
-def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
+def _moved_rows(joint: JointFit, one: NonlinearRow, scale: Real) -> Real:
     """Derivatives of the nonlinear effect by theta, `fit.linear` and its size, (p + 1, n).
 
     Differences over a standard deviation, `scale`, to either side, since samples begin and cease to
@@ -315,8 +302,6 @@ def _moved_rows(joint: JointFit, one: Nonlinearity, scale: Real) -> Real:
     problem, fit = joint.problem, joint.best.fit
     vector = np.concatenate([fit.theta, fit.linear, fit.nuisance[-1:]])
     out = np.zeros((vector.size, problem.y.size))
-    if one.within is not None and one.within.structure != fit.structure:
-        return out
 
     def effect(at: Real) -> Real:
         theta, linear = at[: fit.theta.size], at[fit.theta.size : -1]
@@ -358,8 +343,8 @@ def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
     others = " or ".join(KIND_WORDS[kind] for kind in one.others)
     instead = f" The record may contain {others} instead: the intervals allow for it."
     return Finding(
-        code=one.kind,
-        message=f"The model includes {KIND_WORDS[one.kind]}: {size_in_words(one.part, units)}."
+        code=one.part.kind,
+        message=f"The model includes {one.part.words}: {size_in_words(one.part, units)}."
         f"{instead if others else ''} The figures are those of the linear part. Include this "
         "effect in a simulation, or keep the stimulus away from it.",
         severity="info",

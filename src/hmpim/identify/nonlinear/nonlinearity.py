@@ -8,21 +8,23 @@ records: `hmpim.identify.records.levels`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hmpim.identify.arrays import Real, thinned
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.nonlinear.evidence import Outcome, Subject, better_of, inspect_fit
+from hmpim.identify.nonlinear.evidence import Outcome, Subject, criterion_of, inspect_fit
 from hmpim.identify.nonlinear.harmonic_regression import SweepView
-from hmpim.identify.nonlinear.mechanisms import KIND_WORDS, LONGEST, Mechanism
+from hmpim.identify.nonlinear.mechanisms import LONGEST, Mechanism
 from hmpim.identify.nonlinear.sweep_phase import sweep_phase
 from hmpim.identify.result import HarmonicCurve, Nonlinearity
 from hmpim.identify.result.digits import percent, plus_minus
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.worth import MATERIAL, MOST, WORTH
+from hmpim.model.nonlinear import KIND_WORDS
 from hmpim.record import Finding
 
 __all__ = ["Inspection", "inspect_nonlinearity"]
@@ -58,19 +60,6 @@ def inspect_nonlinearity(
     output at the same time, only harmonics are tested. Effects up to `floor` are ignored, the
     r.m.s. error of rounding in the output's unit. If the nonlinearity is `modelled`, `fit` is the
     linear part of that model, and its residual includes the nonlinear part.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.fit import fit_structure
-    >>> from hmpim.model import STRUCTURES, prepare_input
-    >>> t = np.arange(2000) / 200
-    >>> u = np.sin(2 * np.pi * (0.1 * t + t**2))
-    >>> y = u - 0.1 * u**3 + 0.01 * np.random.default_rng(0).standard_normal(2000)
-    >>> data = Problem(source=prepare_input(u, "bandlimited"), y=y, valid=None, longest_delay=9.0)
-    >>> fit = fit_structure(data, STRUCTURES["static"], np.zeros(1))
-    >>> found = inspect_nonlinearity(u, data, fit, fs=200.0)
-    >>> found.seen.mechanisms[0].kind, [finding.code for finding in found.findings]
-    ('curvature', ['nonlinear'])
     """
     output = float(np.std(problem.counting(problem.y)))
     block = -(-u.size // LONGEST)
@@ -78,7 +67,8 @@ def inspect_nonlinearity(
     subject = Subject(u=u, problem=problem, fs=fs, others=tuple(others), sweep=sweep, block=block)
     outcome = inspect_fit(subject, fit)
     if plain is not None and outcome.rms > 0:
-        outcome = better_of(subject, outcome, inspect_fit(subject, plain))
+        both = outcome, inspect_fit(subject, plain)
+        outcome = min(both, key=partial(criterion_of, subject))
     matters = outcome.effect > WORTH * output and outcome.rms > floor
     named = outcome.named if matters else ()
     shares = _shares(outcome, outcome.fit.cost / max(problem.counted, 1))
@@ -223,10 +213,8 @@ def _summary(
     if (harmonics := outcome.harmonics) is not None:
         even, odd = (harmonics.rms(p) / output for p in (0, 1))
         model = thinned(outcome.fit.prediction, subject.block)
-        curves = [_own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)]
-        for h in harmonics.orders:
-            parts = {"frequency": h.frequency, "amplitude": h.amplitude, "std": h.std}
-            curves.append(HarmonicCurve(order=h.order, **parts))
+        own = _own_amplitude(harmonics.regression.view, model, subject.fs / subject.block)
+        curves = [own, *(harmonic.curve for harmonic in harmonics.orders)]
     elif outcome.mechanisms:
         share = outcome.mechanisms[0].rms / output
         even, odd = (share, 0.0) if outcome.mechanisms[0].kind == "asymmetry" else (0.0, share)

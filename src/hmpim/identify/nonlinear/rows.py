@@ -17,27 +17,36 @@ curvature              x³: a scale that changes with the deflection
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import without
 from hmpim.identify.fitting.sampled_rows import part_of
-from hmpim.identify.nonlinear.fine import linear_part, linear_part_finely
-from hmpim.identify.nonlinear.mechanisms import GAPS, Kind
+from hmpim.identify.nonlinear.mechanisms import GAPS
 from hmpim.identify.worth import FEW, MATERIAL, PART
 from hmpim.model.dynamics import StructureName, coefficients_of
-from hmpim.model.fine import FINE, finely, sampled
+from hmpim.model.fine import FINE, finely, joined, sampled
 from hmpim.model.friction import Rubbing, rubbed
-from hmpim.model.nonlinear import Place
+from hmpim.model.nonlinear import Kind, Place
 from hmpim.model.operators import gap_crossed, play, power_of, pushed
 from hmpim.model.response import per_step
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["TURNS", "Command", "Nonlinearity", "dead_zone", "first_rows", "with_row"]
+__all__ = [
+    "TURNS",
+    "Command",
+    "NonlinearRow",
+    "dead_zone",
+    "first_rows",
+    "linear_part",
+    "with_row",
+]
 
 _Lag = Callable[[Fit], float]
 """Lag of the force behind the command, in samples, by a fit."""
@@ -59,12 +68,12 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Nonlinearity:
+class NonlinearRow:
     """A row for a nonlinearity of size 1."""
 
     kind: Kind
     row: Real  # (n,): its effect on the output
-    again: Callable[[Problem, Fit], "Nonlinearity"]  # from the data with this row, and their fit
+    made: Callable[[Problem, Fit, float], "NonlinearRow"]  # from data, their fit and a size
     counts: Mask | None = None  # (n,): samples that depend on the linear part; None if all do
     size: float = 0.0  # for which the row was made
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
@@ -74,8 +83,36 @@ class Nonlinearity:
     within: Fit | None = None  # of friction: the dynamics in which it acts
     lag: float = 0.0  # of friction: between the command and the force, in samples
 
+    def again(self, problem: Problem, fit: Fit) -> "NonlinearRow":
+        """The row from the data with this row, the last of its rows, and their fit."""
+        return self.made(problem, fit, float(fit.nuisance[-1]))
 
-def with_row(problem: Problem, one: Nonlinearity) -> Problem:
+
+def linear_part(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
+    """Effect of the input, of `others` and of the initial state on the output, (n,)."""
+    x = fit.prediction - fit.linear[-1]
+    if others is not None:
+        x = x + others
+    if problem.nuisance is not None:
+        x = x - fit.nuisance @ problem.nuisance
+    return np.asarray(x)
+
+
+def linear_part_finely(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
+    """The same on the finer clock."""
+    steps = np.arange(FINE)[:, None] * np.eye(1, fit.theta.size) / FINE
+    parts = [part_of(problem, fit.structure, fit.theta - step) for step in steps]
+    driven = np.stack([part.driven(fit.linear[:-1]) for part in parts], axis=1)
+    rest = np.zeros(driven.shape[0]) if others is None else others
+    if fit.initial.size:
+        rest = linear_part(problem, fit, others) - driven[:, 0]
+    if rest.any():
+        at = np.arange(rest.size)
+        driven += scipy.interpolate.CubicSpline(at, rest)(at[:, None] + np.arange(FINE) / FINE)
+    return joined(driven)
+
+
+def with_row(problem: Problem, one: NonlinearRow) -> Problem:
     """The data with the row, without samples that do not count."""
     valid = problem.valid
     if one.counts is not None:
@@ -85,7 +122,7 @@ def with_row(problem: Problem, one: Nonlinearity) -> Problem:
 
 def first_rows(
     kind: Kind, command: Command, problem: Problem, start: Fit
-) -> Iterator[Nonlinearity]:
+) -> Iterator[NonlinearRow]:
     """Rows of a kind as the linear fit suggests them."""
     if kind == "backlash":
         largest = _most(linear_part(problem, start, command.others))
@@ -97,29 +134,29 @@ def first_rows(
             if first is not None:
                 yield first
     elif kind in ("hardening", "softening"):
-        yield _forced(command, kind, problem, start, power=3)
+        yield _forced(command, kind, 3, problem, start)
     elif kind == "curvature":
-        yield _scaled(command, kind, problem, start, power=3)
+        yield _scaled(command, kind, 3, problem, start)
     elif kind == "asymmetry":
-        yield _scaled(command, kind, problem, start, power=2)
+        yield _scaled(command, kind, 2, problem, start)
         if start.structure.order:
-            yield _forced(command, kind, problem, start, power=2)
+            yield _forced(command, kind, 2, problem, start)
 
 
-def _likeliest(tried: list[Nonlinearity], problem: Problem, fit: Fit) -> Nonlinearity:
+def _likeliest(tried: list[NonlinearRow], problem: Problem, fit: Fit) -> NonlinearRow:
     """The row that explains most of the residual together with a linear change of the model."""
     along, power = _regressed(tried, problem, fit)
     return tried[int(np.argmax(np.maximum(along, 0.0) ** 2 / power))]
 
 
-def _regressed(tried: list[Nonlinearity], problem: Problem, fit: Fit) -> tuple[Real, Real]:
+def _regressed(tried: list[NonlinearRow], problem: Problem, fit: Fit) -> tuple[Real, Real]:
     """Products with the residual, and powers, of what no linear change of the model explains."""
     rows = problem.plain.masked(np.stack([one.row for one in tried]))
     own = without(rows, jacobian(problem.plain, fit))
     return own @ fit.residual, np.maximum(np.vecdot(own, own), np.finfo(float).tiny)
 
 
-def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | None:
+def dead_zone(command: Command, problem: Problem, start: Fit) -> NonlinearRow | None:
     """A dead zone of the input, which is known once its width is: Newton's method for the width."""
     fine = finely(command.u, command.intersample)
     largest, structure = float(np.max(np.abs(fine))), start.structure
@@ -141,15 +178,13 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> Nonlinearity | 
     return None
 
 
-def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
+def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> NonlinearRow:
     """A dead zone of half a width, of an input on the finer clock."""
+    half = abs(half)
     row = -_through_model(sampled(np.clip(fine, -half, half)) / half, problem, fit)
-
-    def again(_: Problem, fit: Fit) -> Nonlinearity:
-        return _dead(fine, problem, fit, abs(float(fit.nuisance[-1])))
-
-    return Nonlinearity(
-        kind="dead_zone", row=row, again=again, size=half, at="command", reach=_most(fine)
+    made = partial(_dead, fine)
+    return NonlinearRow(
+        kind="dead_zone", row=row, made=made, size=half, at="command", reach=_most(fine)
     )
 
 
@@ -160,20 +195,17 @@ def _through_model(u: Real, problem: Problem, fit: Fit) -> Real:
     return part.driven(fit.linear[:-1])
 
 
-def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> Nonlinearity:
+def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> NonlinearRow:
     """Backlash of half a gap; while it waits the output does not depend on the input."""
+    half = abs(half)
     fine = linear_part_finely(problem, fit, command.others)  # it turns between samples
     moved = ((play(fine, half) - fine) / half)[::FINE]
     counts = np.abs(np.abs(moved) - 1.0) < MATERIAL**2
     begins = int(np.count_nonzero(~gap_crossed(fine, half)[::FINE]))
     counts[:begins] = False
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _waiting(command, data, fit, abs(float(fit.nuisance[-1])))
-
-    return Nonlinearity(
+    return NonlinearRow(
         kind="backlash",
-        again=again,
+        made=partial(_waiting, command),
         row=moved,
         counts=counts,
         size=half,
@@ -182,22 +214,19 @@ def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> Nonli
     )
 
 
-def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: float) -> Nonlinearity:
+def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: float) -> NonlinearRow:
     """Coulomb friction, in the output's unit: at rest it holds the output.
 
     Samples count that would move with a little more friction as well: others may come and go.
     """
+    force = abs(force)
     fine = linear_part_finely(problem, fit, command.others)
     unit = Rubbing(denominator=fit.denominator, lag=lag(fit))
     effect, moves = rubbed(fine, unit, force, margin=FEW)
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _rubbing(command, lag, data, fit, abs(float(fit.nuisance[-1])))
-
-    return Nonlinearity(
+    return NonlinearRow(
         kind="friction",
         row=effect[::FINE] / force,
-        again=again,
+        made=partial(_rubbing, command, lag),
         counts=moves[::FINE],
         size=force,
         at="force",
@@ -207,7 +236,7 @@ def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: flo
     )
 
 
-def _first_friction(command: Command, lag: _Lag, problem: Problem, fit: Fit) -> Nonlinearity | None:
+def _first_friction(command: Command, lag: _Lag, problem: Problem, fit: Fit) -> NonlinearRow | None:
     """Friction of the size by which its row explains the residual; None if against the motion."""
     size = GAPS[0] * _most(linear_part(problem, fit, command.others))
     for _ in range(_GUESSES):
@@ -245,39 +274,35 @@ _LAGS: dict[StructureName, tuple[_Lag, ...]] = {
 def _forced(
     command: Command,
     kind: Kind,
+    power: int,
     data: Problem,
     fit: Fit,
+    size: float = 0.0,
     *,
-    power: int,
-    own: Real | None = None,
-) -> Nonlinearity:
+    shape: Real | None = None,
+) -> NonlinearRow:
     """A force by a power of the output, over the linear one at the largest.
 
-    It is followed on the finer clock, since its harmonics go beyond half the rate; `own` is the
-    effect so far.
+    It is followed on the finer clock, since its harmonics go beyond half the rate; `size` times
+    `shape` is the effect so far.
     """
     z = linear_part_finely(data, fit, command.others)
-    z = z if own is None else z + own
+    z = z if shape is None else z + size * shape
     largest = _most(z)
     fine = -pushed(power_of(z, power, largest), per_step(fit.denominator, FINE))
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _forced(command, kind, data, fit, power=power, own=float(fit.nuisance[-1]) * fine)
-
-    return Nonlinearity(
-        kind=kind, row=np.asarray(fine[::FINE]), again=again, at="force", reach=largest
+    made = partial(_forced, command, kind, power, shape=fine)
+    return NonlinearRow(
+        kind=kind, row=np.asarray(fine[::FINE]), made=made, at="force", reach=largest
     )
 
 
-def _scaled(command: Command, kind: Kind, data: Problem, fit: Fit, *, power: int) -> Nonlinearity:
+def _scaled(
+    command: Command, kind: Kind, power: int, data: Problem, fit: Fit, _: float = 0.0
+) -> NonlinearRow:
     """A scale that changes with the deflection."""
-
-    def again(data: Problem, fit: Fit) -> Nonlinearity:
-        return _scaled(command, kind, data, fit, power=power)
-
     x = linear_part(data, fit, command.others)
-    largest = _most(x)
-    return Nonlinearity(kind=kind, row=power_of(x, power, largest), again=again, reach=largest)
+    largest, made = _most(x), partial(_scaled, command, kind, power)
+    return NonlinearRow(kind=kind, row=power_of(x, power, largest), made=made, reach=largest)
 
 
 def _most(x: Real) -> float:

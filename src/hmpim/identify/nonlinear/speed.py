@@ -13,6 +13,7 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.data import polished
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -65,16 +66,6 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     No limit is tried if the residual of a plain fit is white, or if a richer fit has less than 1/25
     of the best plain one's cost. None unless a limit explains more than the linear fit (odds of 400
     to 1), and more than any other kind of nonlinearity.
-
-    Examples
-    --------
-    >>> from hmpim.identify.fitting.joint import joint_fit
-    >>> t = np.arange(600) / 100
-    >>> u = np.sin(2 * np.pi * (0.1 * t + 0.067 * t**2))
-    >>> y = np.convolve(rate_limited(u, 0.04), np.ones(5) / 5)[:600]
-    >>> y += 0.01 * np.random.default_rng(0).standard_normal(600)
-    >>> round(limited_command(u, joint_fit(u, y)).speed, 3)
-    0.04
     """
     best, problem = joint.best, joint.problem
     known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)
@@ -103,7 +94,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if start is not best:
         plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
     gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
-    others = bends(u, problem, plainly, intersample=start.intersample, fs=1.0)
+    others = bends(u, problem, plainly, intersample=start.intersample)
     if any(other.kind != "rate_limit" and other.gain > gained for other in others):
         return None
     return limited
@@ -242,16 +233,8 @@ def with_free_speed(joint: JointFit, slope: Real) -> JointFit:
     """
     problem = joint.problem.with_row(slope)
     weighed = replace(joint.weighed, nuisance=problem.nuisance)
-    structure, theta = joint.best.fit.structure, joint.best.fit.theta
-    fit = fit_structure(weighed, structure, theta, precision=weighed.final)
-    best = replace(joint.best, fit=fit)
-    return replace(
-        joint,
-        problem=problem,
-        weighed=weighed,
-        best=best,
-        trials=tuple(best if trial is joint.best else trial for trial in joint.trials),
-    )
+    free = joint.with_fit(polished(weighed, joint.best.fit))
+    return replace(free, problem=problem, weighed=weighed)
 
 
 def _followed(fine: Real, step: float) -> Real:

@@ -21,7 +21,8 @@ import scipy
 
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.result import Identification, PairIdentification
+from hmpim.identify.result import Identification
+from hmpim.identify.result.pair import linear_model
 from hmpim.model import Model, coefficient_vector, simulate
 from hmpim.model.draws import with_coefficients
 from hmpim.record import Aligned, Channel, Finding, Record, Signal, Waveform, fit_clock, on_grid
@@ -101,7 +102,7 @@ def _corrected(
     driven = [
         (model, waveform, source.values)
         for waveform, source in zip(aligned.waveforms, aligned.inputs, strict=True)
-        if (model := _linear(found[channel.name, waveform.name])) is not None
+        if (model := linear_model(found[channel.name, waveform.name])) is not None
     ]
     if not driven:
         return signal
@@ -123,19 +124,6 @@ def _corrected(
     )
     values.setflags(write=False)
     return replace(signal, values=values)
-
-
-def _linear(pair: PairIdentification) -> Model | None:
-    """Linear model of a pair, without bias and effects; None without delay or scale factor."""
-    delay, scale = pair.parameters.delay, pair.parameters.scale_factor
-    if delay is None or scale is None:
-        return None
-    return Model(
-        delay=delay.value,
-        scale_factor=scale.value,
-        numerator=pair.numerator,
-        denominator=pair.denominator,
-    )
 
 
 def _counted(channel: Channel, aligned: Aligned) -> Mask:

@@ -152,9 +152,7 @@ def fit_through(joint: JointFit, instrument: Instrument) -> tuple[JointFit, Real
     turn = right.T / np.maximum(values, UNSEEN * values[0]) @ left.T @ (tools @ tools.T)
     cov = turn @ covariance(tools, residual, freedom=freedom, white=white) @ turn.T
     cov = cov / np.outer(size, size)
-    best = replace(joint.best, fit=fit)
-    trials = tuple(best if trial is joint.best else trial for trial in joint.trials)
-    return replace(joint, best=best, trials=trials), np.asarray(cov)
+    return joint.with_fit(fit), np.asarray(cov)
 
 
 def _moved(problem: Problem, fit: Fit, step: Real) -> Fit:

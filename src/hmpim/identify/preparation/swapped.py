@@ -74,13 +74,7 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
 
 
 def swapped_finding(source: str, output: str) -> Finding:
-    """Report that input and output are swapped.
-
-    Examples
-    --------
-    >>> swapped_finding("u", "y").message[:60]
-    "Input 'u' follows output 'y', not the other way round: the c"
-    """
+    """Report that input and output are swapped."""
     return Finding(
         code="swapped",
         message=f"Input {source!r} follows output {output!r}, not the other way round: the "

@@ -12,15 +12,22 @@ import numpy as np
 
 from hmpim.identify.arrays import Complex, Real, median
 from hmpim.identify.chance import DEVIATIONS, HALF
-from hmpim.identify.reading.sampled_response import sampled_response
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import BANDWIDTHS
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model import RationalDelay, response
+from hmpim.model.discrete import discretise
 from hmpim.record import Intersample
 
-__all__ = ["are_apart", "disagreeing", "less_bias", "ratio_at", "response_bandwidths"]
+__all__ = [
+    "are_apart",
+    "disagreeing",
+    "less_bias",
+    "ratio_at",
+    "response_bandwidths",
+    "sampled_response",
+]
 
 _FEWEST = 5
 """Least number of frequencies of the measured response for a line."""
@@ -50,6 +57,22 @@ def _divided(
     """Ratio of measured to modelled response at each frequency, and its standard deviation."""
     modelled = sampled_response(system, measured.frequency, fs=fs, intersample=intersample)
     return measured.response / modelled, measured.std / np.abs(modelled)
+
+
+def sampled_response(
+    system: RationalDelay, frequency: Real, *, fs: float, intersample: Intersample
+) -> Complex:
+    """Response from samples of the input to samples of the output, at frequencies in Hz, (m,).
+
+    It depends on the input between its samples, and on its aliases: for a first-order lag these are
+    a percent of the response well below a quarter of the rate.
+    """
+    if intersample not in ("zoh", "foh"):
+        return response(system, frequency)
+    whole = np.floor(system.delay * fs + 1e-9) / fs  # may be negative, unlike that of a program
+    rest = replace(system, delay=max(system.delay - whole, 0.0))
+    stepped = discretise(rest, fs=fs, intersample=intersample)
+    return np.asarray(stepped.response(frequency) * np.exp(-2j * np.pi * frequency * whole))
 
 
 def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:

@@ -16,7 +16,8 @@ from hmpim.identify.noise.whiteness import is_steady, is_white
 from hmpim.identify.reading.figures import gradient, read_figures, variance_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
-from hmpim.model.response import RationalDelay
+from hmpim.model.filters import in_z
+from hmpim.model.response import RationalDelay, by_falling_powers
 
 __all__ = ["Readings", "from_lag", "read_parameters"]
 
@@ -45,6 +46,31 @@ class Readings:
         """Variance of a function of `vector`, to first order."""
         slope = gradient(function, self.vector)
         return variance_of(slope, self.covariance)
+
+    @property
+    def coefficients(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Numerator and denominator of unit gain, highest power first: of s, or of z for software.
+
+        The denominator has a coefficient of 1 at s⁰, or at the highest power of z.
+        """
+        above, below = self.system.numerator, self.system.denominator
+        if above.any():  # the first that is not 0 is the scale factor
+            above = above / above[np.flatnonzero(above)[0]]
+        if self.system.step is not None:
+            length = max(above.size, below.size)
+            above, below = (np.pad(in_z(c), (0, length - c.size))[::-1] for c in (above, below))
+            above, below = above / below[-1], below / below[-1]
+        return tuple(above[::-1].tolist()), tuple(below[::-1].tolist())
+
+    @property
+    def by_falling_powers(self) -> Real | None:
+        """Covariance of delay, numerator and denominator, (q, q), highest power first.
+
+        None where it is not finite, because the record does not determine every parameter.
+        """
+        known = self.coefficient_covariance
+        finite = np.isfinite(known).all()
+        return by_falling_powers(known, self.system.numerator.size) if finite else None
 
 
 def read_parameters(

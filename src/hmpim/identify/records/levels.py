@@ -239,18 +239,7 @@ def _only(structure: str) -> list[str]:
 def compare_levels(
     results: Sequence[Parameters], amplitudes: Sequence[float], *, unit: str = ""
 ) -> LevelComparison:
-    """Compare what was identified at several amplitudes, in any order, all in one unit.
-
-    Examples
-    --------
-    >>> from hmpim.identify.result import Estimate
-    >>> def at(frequency):
-    ...     return Parameters(natural_frequency=Estimate(
-    ...         value=frequency, std=0.01, ci95=(frequency - 0.02, frequency + 0.02), unit="Hz"))
-    >>> found = compare_levels([at(10.0), at(10.4), at(10.9)], [1.0, 2.0, 3.0])
-    >>> [finding.code for finding in found.findings], found.linear_up_to
-    (['nonlinear', 'hardening'], 1.0)
-    """
+    """Compare what was identified at several amplitudes, in any order, all in one unit."""
     levels = sorted(zip(map(float, amplitudes), results, strict=True), key=lambda level: level[0])
     trends = tuple(t for t in (_trend(levels, name) for name in _COMPARED) if t is not None)
     changed = [

@@ -13,11 +13,12 @@ from hmpim.identify.result.estimate import Estimate, Verdict
 from hmpim.identify.result.measured import FrequencyResponse, Nonlinearity, ResponseBandwidths
 from hmpim.identify.result.parameters import PaperEstimates, Parameters
 from hmpim.identify.result.plain import Plain, by_fields, fields_in
+from hmpim.model import Model
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.record import Finding, Intersample, Stopping
 from hmpim.tables import html_table, shortened
 
-__all__ = ["Candidate", "PairIdentification", "fit_percent", "pair_rows"]
+__all__ = ["Candidate", "PairIdentification", "fit_percent", "linear_model", "pair_rows"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,6 +153,21 @@ class PairIdentification(ByValue, Plain):
     saturation_low = _Figure("Value below which the output does not go.")
     saturation_high = _Figure("Value above which the output does not go.")
     quantization_step = _Figure("Smallest step of the output.")
+
+
+def linear_model(pair: PairIdentification, *, fs: float | None = None) -> Model | None:
+    """The linear part without bias, noise and effects; None without delay or scale factor."""
+    delay, scale = pair.parameters.delay, pair.parameters.scale_factor
+    if delay is None or scale is None:
+        return None
+    return Model(
+        delay=delay.value,
+        scale_factor=scale.value,
+        numerator=pair.numerator,
+        denominator=pair.denominator,
+        intersample=pair.intersample,
+        fs=fs,
+    )
 
 
 _FIRST = ("delay", "natural_frequency", "time_constant", "damping_ratio")

@@ -22,7 +22,7 @@ from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import MODELLED
 from hmpim.identify.statistics.fit import Fitted
-from hmpim.identify.statistics.misfit import explained_by, probes_at
+from hmpim.identify.statistics.misfit import TESTABLE, explained_by, probes_at
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.run import STOOD, cubes_by, of_cubes
 from hmpim.identify.statistics.statistics import Statistics
@@ -36,10 +36,6 @@ _GROUPS = 5
 
 _TIMES = 3.0
 """The cube of a sinusoid has a part at three times its frequency, with a third of the amplitude."""
-
-_SEEN = 1e-6
-"""Share of a direction's power, below which the input's own responses explain it and it is not
-tested."""
 
 TIMED = tuple(name for name in MODELLED if name not in ("scale_factor", "bias"))
 """Figures of fast motion; a held output shows those of slow motion without error."""
@@ -79,7 +75,7 @@ def beyond_of(fitted: Fitted, products: Products, band: tuple[float, float]) -> 
     cost -= float(residual @ solved(first.gram, residual))
     size = np.where(np.diag(third.gram) > 0.0, np.diag(third.gram), 1.0)
     almost_binary = float(np.mean(np.diag(left) / size)) < MUCH  # its edges are between the samples
-    power, determined = explained(left, gain, least=_SEEN, size=size)
+    power, determined = explained(left, gain, least=TESTABLE, size=size)
     if almost_binary or not determined or cost <= 0.0:
         return Misfit()
     freedom = products.counted - linear.rows.shape[0] - int(determined)

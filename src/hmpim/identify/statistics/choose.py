@@ -12,9 +12,6 @@ from hmpim.identify.fitting.course import Course, begun, looks_held
 from hmpim.identify.fitting.data import Counted, Data, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
-    MODES,
-    PLAIN,
-    RICH,
     integrator_starts,
     members,
 )
@@ -128,18 +125,16 @@ class CompressedData(Data):
 def choose(
     statistics: Statistics,
     *,
-    intersample: Intersample | None = None,
-    structures: tuple[StructureName, ...] | None = None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
 ) -> tuple[CompressedData, JointFit]:
     """Fit every structure and choose one, as from samples; every fit is a `Fitted`.
 
     Arguments are those of `identify_statistics`. A `RecordError` is raised if too few samples
     count, or the output stands still where they do.
     """
-    if intersample == "sampled":
-        raise RecordError("intersample='sampled' needs the samples; identify the record itself")
     conditioned = _is_conditioned(statistics)
-    names = tuple(n for n in structures or (*PLAIN, *RICH, *MODES) if n not in INTEGRATING)
+    names = tuple(name for name in structures if name not in INTEGRATING)
     natural: Intersample = intersample or ("zoh" if _looks_held(statistics) else "bandlimited")
     data = CompressedData.of(statistics, skipped=statistics.lags if conditioned else 0)
     course = begun(data, natural, names, _ALL)

@@ -10,8 +10,6 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import Evidence, judge, judged
 from hmpim.identify.judgement.checks import COMPRESSED
 from hmpim.identify.judgement.verdict import unfollowed
-from hmpim.identify.reading.candidates import candidates_of
-from hmpim.identify.reading.coefficients import coefficients_of, highest_first
 from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.reading.readings import Readings
 from hmpim.identify.reading.spanned import spanned, without_noise
@@ -54,24 +52,17 @@ _FREQUENCIES = 200
 def identify_statistics(
     statistics: Statistics,
     *,
-    intersample: Intersample | None = None,
-    structures: tuple[StructureName, ...] | None = None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
 ) -> Identification:
     """Identify one pair from compressed records.
 
-    The input between its samples is by default as the statistics state it, or the likeliest, and
-    all structures are tried; integrators are tried in any case, and refused.
-
-    Raises
-    ------
-    RecordError
-        If the channels do not move, too few samples were read, or the memory is longer than the
-        window, as that of an integrator is.
+    The input between its samples is the likeliest if it is not stated. Integrators are tried in any
+    case, and refused, as their memory is longer than any window; so are channels that do not move,
+    and too few samples.
     """
     _check_moves(statistics)
-    data, joint = choose(
-        statistics, intersample=intersample or statistics.intersample, structures=structures
-    )
+    data, joint = choose(statistics, intersample=intersample, structures=structures)
     if joint.related:
         _check_window(statistics, as_fitted(joint.best.fit))
     found = integrator_of(statistics, data, joint)
@@ -168,7 +159,7 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         parameters = without_noise(parameters, _DIGITS)
     else:
         findings = (*findings, *nonlinear_findings(statistics, data.beyond(best), evidence))
-    numerator, denominator = coefficients_of(system)
+    numerator, denominator = readings.coefficients
     # Equation (8): the lag of the cross-correlation's peak. The paper's other steps need samples.
     late = np.abs(correlations(statistics)[1][statistics.reach.forth :])
     frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], _FREQUENCIES)
@@ -189,9 +180,9 @@ def _related(statistics: Statistics, data: CompressedData, joint: JointFit) -> P
         ),
         numerator=numerator,
         denominator=denominator,
-        candidates=candidates_of(joint, percent),
+        candidates=joint.candidates(percent),
         warnings=(*findings, _no_samples(statistics)),
-        covariance=highest_first(spread, system),
+        covariance=readings.by_falling_powers,
     )
 
 

@@ -15,9 +15,8 @@ from hmpim.identify.fitting.start import starting_values
 from hmpim.identify.fitting.trial import trial_of
 from hmpim.identify.judgement import all_doubtful
 from hmpim.identify.reading.figures import read_figures
-from hmpim.identify.result import Identification, Parameters
+from hmpim.identify.result import Parameters
 from hmpim.identify.result.error_bars import noise_estimate
-from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.fit import Compressed, Fitted, fit_briefly, follow, pulse
 from hmpim.identify.statistics.misfit import Probes, misfit_of, probes_at
 from hmpim.identify.statistics.products import Products
@@ -221,10 +220,6 @@ class LiveEstimator:
             self._probes = self._probes_about(fitted)
         misfit = misfit_of(fitted, fitted.products, self._band, self._probes)
         return misfit.probability < FALSE_ALARM
-
-    def identification(self) -> Identification:
-        """The whole identification of all samples so far, with every structure and every check."""
-        return identify_statistics(self._statistics, intersample=self._mode)
 
     def _begin(self, problem: Compressed) -> Fitted:
         """A new start: every plain structure from the data alone."""

@@ -18,14 +18,14 @@ from hmpim.identify.statistics.fit import Fitted
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
 
-__all__ = ["Probes", "explained_by", "hidden_pole_of", "misfit_of", "probes_at"]
+__all__ = ["TESTABLE", "Probes", "explained_by", "hidden_pole_of", "misfit_of", "probes_at"]
 
 _GROUPS = 12
 """Frequencies that are tested."""
 
-_SEEN = 1e-6
-"""Share of the greatest direction, below which the model's parameters explain a direction and it is
-not tested."""
+TESTABLE = 1e-6
+"""Share of the greatest direction, or of its own power, below which a direction is not tested: the
+model's parameters explain it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,7 +65,7 @@ def misfit_of(
     band is in cycles per sample.
     """
     gain, left, cost, *_ = _in_addition(fitted, products, probes.rows, probes.transforms)
-    power, count = explained(left, gain, least=_SEEN)
+    power, count = explained(left, gain, least=TESTABLE)
     freedom = products.counted - fitted.weights.size - 1
     return explained_by(float(power), int(count), cost, freedom)
 

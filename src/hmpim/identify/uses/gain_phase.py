@@ -11,7 +11,8 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.reading.bandwidth import ratio_at
 from hmpim.identify.result import Estimate, PairIdentification
 from hmpim.identify.result.error_bars import estimate
-from hmpim.model import Model, RationalDelay, phase, response
+from hmpim.identify.result.pair import linear_model
+from hmpim.model import RationalDelay, phase, response
 from hmpim.model.dynamics import FILTERS
 from hmpim.model.response import log_slopes
 
@@ -88,20 +89,13 @@ def gain_and_phase(
     (-90, -90, 6.0)
     """
     places = measurable(frequency, fs)
-    p = pair.parameters
-    if p.delay is None or p.scale_factor is None or pair.covariance is None:
+    model = linear_model(pair, fs=fs)
+    if model is None or pair.covariance is None:
         raise ArgumentError(
             f"{pair.output!r} from {pair.input!r} has no model with error bars, so no gain and "
             "phase can be read off; see its warnings"
         )
-    system = Model(
-        delay=p.delay.value,
-        scale_factor=p.scale_factor.value,
-        numerator=pair.numerator,
-        denominator=pair.denominator,
-        intersample=pair.intersample,
-        fs=fs,
-    ).system
+    system = model.system
     if system.step is not None:
         system = _as_fitted(system, pair)
     return tuple(_at(pair, float(f), system, pair.covariance, fs) for f in places)

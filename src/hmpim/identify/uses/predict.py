@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.fit import FORGETS
 from hmpim.identify.result import Estimate, PairIdentification, fit_percent
 from hmpim.identify.result.groups import in_words
+from hmpim.identify.result.pair import linear_model
 from hmpim.identify.uses.nonlinear import applied, known_state
 from hmpim.model import Model, Spread, slowest_time_constant
 from hmpim.record import Finding, Record, uniform
@@ -78,18 +79,15 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
     RecordError
         If the record does not determine a figure that a model needs.
     """
-    p = pair.parameters
-    if p.delay is None or p.scale_factor is None or p.bias is None or p.noise_std is None:
+    p, linear = pair.parameters, linear_model(pair, fs=rate_of(pair) if fs is None else fs)
+    if linear is None or p.bias is None or p.noise_std is None:
         raise RecordError(
             f"{pair.output!r} from {pair.input!r} has no model, because the record does not "
             f"determine its {_why(pair)}"
         )
     frequency = pair.frequency_response.frequency
-    return Model(
-        delay=p.delay.value,
-        scale_factor=p.scale_factor.value,
-        numerator=pair.numerator,
-        denominator=pair.denominator,
+    return replace(
+        linear,
         bias=p.bias.value,
         noise_std=p.noise_std.value,
         input=pair.input,
@@ -99,8 +97,6 @@ def to_model(pair: PairIdentification, *, fs: float | None = None) -> Model:
         saturation_high=_value(p.saturation_high),
         hold_period=_value(p.hold_period),
         quantization_step=_value(p.quantization_step),
-        intersample=pair.intersample,
-        fs=rate_of(pair) if fs is None else fs,
         band=float(frequency[-1]) if frequency.size else None,
         spread=_spread(pair),
         nonlinear=pair.nonlinear_part,
