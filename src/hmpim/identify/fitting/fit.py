@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, dots
 from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly
@@ -148,7 +148,7 @@ class _Known:
         self.target = problem.masked(problem.y)
         self.plain = problem.fixed()
         self.fixed = problem.masked(self.plain)
-        self.gram = self.fixed @ self.fixed.T
+        self.gram = dots(self.fixed, self.fixed)
         self.cross = self.fixed @ self.target
 
 
@@ -177,8 +177,8 @@ class _Evaluation:
         self.counted = first.masked(self.rows)
         own = self.counted.shape[0]
         self._gram = np.empty((own + len(known.cross),) * 2)
-        self._gram[:own, :own] = self.counted @ self.counted.T
-        self._gram[own:, :own] = known.fixed @ self.counted.T
+        self._gram[:own, :own] = dots(self.counted, self.counted)
+        self._gram[own:, :own] = dots(known.fixed, self.counted)
         self._gram[:own, own:] = self._gram[own:, :own].T
         self._gram[own:, own:] = known.gram
         if first.source.degree == SAMPLES_ALONE:  # rounding may be the only noise
@@ -223,9 +223,9 @@ class _Evaluation:
         mixed, own = np.zeros((size, self.linear.size)), self.counted.shape[0]
         for here in self.problems[0].stretches(0, self.residual.size):
             rows = self.slopes(here)
-            inner += rows @ rows.T
-            mixed[:, :own] += rows @ self.counted[:, here].T
-            mixed[:, own:] += rows @ self._known.fixed[:, here].T
+            inner += dots(rows, rows)
+            mixed[:, :own] += dots(rows, self.counted[:, here])
+            mixed[:, own:] += dots(rows, self._known.fixed[:, here])
             moment += rows @ self.residual[here]
         return inner - mixed @ solved(self._gram, mixed.T), moment
 
