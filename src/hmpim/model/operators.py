@@ -23,7 +23,7 @@ __all__ = [
 
 _Real = NDArray[np.float64]
 
-_SMOOTH = 8
+_SMOOTH = 5
 """Samples, on average, of twice a stretch that is too fast, from which on ramps are found whole."""
 
 _AT_ONCE = 256
