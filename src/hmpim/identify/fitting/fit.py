@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hmpim.identify.arrays import Real, dots
+from hmpim.identify.arrays import Real, dots, parts_of
 from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly
@@ -153,8 +153,9 @@ class _Known:
 
 
 def _known(problem: Problem) -> _Known:
-    """These quantities; those of whitened data are kept for the next fits to the same data."""
-    made = recent(_known, problem.y.nbytes) if problem.filtered else None
+    """These quantities; if they take long, they are kept for the next fits to the same data."""
+    costly = problem.filtered or problem.nuisance is not None
+    made = recent(_known, problem.y.nbytes) if costly else None
     if made is None:
         return _Known(problem)
     if problem not in made:
@@ -197,7 +198,8 @@ class _Evaluation:
 
     def weights(self) -> list[Real]:
         """Linear parameters: numerator and initial state of each input, then the fixed rows'."""
-        return np.split(self.linear, np.cumsum([block.shape[0] for block in self._blocks]))
+        sizes = [block.shape[0] for block in self._blocks]
+        return parts_of(self.linear, [*sizes, self.linear.size - sum(sizes)])
 
     def slopes(self, here: slice) -> Real:
         """Derivatives of the prediction by all delays and denominators, as samples count."""
