@@ -24,8 +24,8 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
-_FEW = 8
-"""Rows from which on BLAS multiplies matrices of long rows faster than row by row."""
+_FEW, _MANY = 5, 8
+"""Rows on one side, and on both, from which on BLAS multiplies long rows faster than one by one."""
 
 _BULK = 60_000
 """Samples from which the size of the bulk of a record is known to half a per cent."""
@@ -60,7 +60,8 @@ def dots(rows: Real, others: Real) -> Real:
     >>> dots(np.array([[1.0, 2.0], [0.0, 1.0]]), np.array([[3.0, 1.0]])).tolist()
     [[5.0], [1.0]]
     """
-    if len(rows) < _FEW:
+    fewer, more = sorted((len(rows), len(others)))
+    if fewer < _FEW or more < _MANY:
         return np.asarray(np.vecdot(rows[:, None], others))
     return rows @ others.T
 
