@@ -4,6 +4,8 @@ A clock is not part of them: speeds and gaps are those of the signal's own sampl
 clock of `hmpim.model.fine` they are near enough to what happens between the samples of a record.
 """
 
+from functools import reduce
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,12 @@ __all__ = [
 ]
 
 _Real = NDArray[np.float64]
+
+_SMOOTH = 5
+"""Samples, on average, of twice a stretch that is too fast, from which on ramps are found whole."""
+
+_AT_ONCE = 256
+"""Samples that are compared at once, and twice as many each time that is not enough."""
 
 
 def reversals(x: _Real) -> NDArray[np.intp]:
@@ -64,10 +72,14 @@ def rate_limited(x: _Real, step: float) -> _Real:
     >>> rate_limited(np.array([0.0, 3.0, 3.0, 3.0]), 1.0).tolist()
     [0.0, 1.0, 2.0, 3.0]
     """
+    moves = np.diff(x)
+    fast = np.sign(moves) * (np.abs(moves) > step)
+    starts = np.flatnonzero(fast)
+    if starts.size > _SMOOTH * np.count_nonzero(fast[1:] != fast[:-1]):
+        return _limited_smoothly(x, step, starts)
     target, reached = x.tolist(), 0
     out, late = x.copy(), target.copy()
-    fast = np.flatnonzero(np.abs(np.diff(x)) > step).tolist()
-    for lost in fast:
+    for lost in starts.tolist():
         if lost < reached:
             continue  # already behind
         now = target[lost]
@@ -82,9 +94,38 @@ def rate_limited(x: _Real, step: float) -> _Real:
             late[reached] = now
         else:
             break
-    for begin in fast[:1]:
+    for begin in starts[:1].tolist():
         out[begin : reached + 1] = late[begin : reached + 1]
     return out
+
+
+def _limited_smoothly(x: _Real, step: float, starts: NDArray[np.intp]) -> _Real:
+    """The same, ramp by ramp, for a signal that seldom turns; it is too fast after `starts`."""
+    ramp, out, end = step * np.arange(x.size), x.copy(), 0
+    ahead = {way: way * x - ramp for way in (1.0, -1.0)}  # constant on a ramp that way
+    while (k := starts.searchsorted(end)) < starts.size:
+        lost = starts.item(k)
+        way = 1.0 if x[lost + 1] > x[lost] else -1.0
+        level, begin = ahead[way].item(lost), lost + 1
+        while begin < x.size:
+            end = _first_up_to(ahead[way], level, begin)
+            out[begin:end] = way * (level + ramp[begin:end])
+            way, level, begin = -way, -level - 2.0 * ramp.item(end - 1), end
+            if end < x.size and ahead[way].item(end) <= level:
+                break  # it has caught up, else the signal has passed it
+    return out
+
+
+def _first_up_to(values: _Real, level: float, begin: int) -> int:
+    """First place from `begin` on with a value up to a level; the number of values if none."""
+    count = _AT_ONCE
+    while begin < values.size:
+        found = values[begin : begin + count] <= level
+        first = found.argmax().item()
+        if found.item(first):
+            return begin + first
+        begin, count = begin + found.size, 2 * count
+    return values.size
 
 
 def pushed(forces: _Real, denominator: _Real) -> _Real:
@@ -106,4 +147,4 @@ def power_of(x: _Real, power: int, largest: float) -> _Real:
     >>> power_of(np.array([1.0, 2.0, -4.0]), 2, 2.0).tolist()
     [0.5, 2.0, 8.0]
     """
-    return np.asarray(largest * (x / largest) ** power)
+    return np.asarray(largest * reduce(np.multiply, [x / largest] * power))

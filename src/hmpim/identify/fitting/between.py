@@ -60,9 +60,18 @@ def fit_under_each_assumption(
             behind.append(fit)
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
+    def as_likely(parameters: int) -> float:
+        """Greatest objective of a fit with so many parameters that is about as likely."""
+        fewer = best.structure.parameters - parameters
+        return least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+
+    def most(fit: Fit) -> float:
+        own = as_likely(fit.structure.parameters) if best.is_white else np.inf
+        return min(own, TWICE * least)  # more of a residual that may follow the input
+
     def moved(some: list[Fit]) -> Fits:
         return [
-            (mode, refit_between(problem, fit, natural, mode, hopeless=TWICE * least))
+            (mode, refit_between(problem, fit, natural, mode, hopeless=most(fit)))
             for mode, problem in problems.items()
             for fit in some
         ]
@@ -78,14 +87,15 @@ def fit_under_each_assumption(
         fewer = best.structure.parameters - fit.structure.parameters
         if fewer <= 0 or fit.structure.name in PLAIN:  # plain ones are far behind a rich one
             continue
-        most = least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
+        likely = as_likely(fit.structure.parameters)
         for mode, problem in problems.items():
-            other = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=most)
+            other = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=likely)
             if not other.converged and other.objective < TWICE**2 * least:
-                other = refit_between(problem, other, mode, mode, hopeless=most)
+                other = refit_between(problem, other, mode, mode, hopeless=likely)
             fitted.append((mode, other))
     for mode, problem in problems.items():
         own = [fit for m, fit in fitted if m == mode]
-        if min(fit.objective for fit in own) < TWICE * least:
+        enough = as_likely(0) if best.is_white else TWICE * least
+        if min(fit.objective for fit in own) < enough:
             fitted += [(mode, fit) for fit in pruned(problem, own, structures)]
     return fitted

@@ -359,12 +359,21 @@ def best_of(
 ) -> Fit:
     """The best of several starts, fitted to convergence if it may lead.
 
-    Unless the rivals are `far_off`, a start whose steps promise no chance against them is given
-    up. In a coloured residual few samples are independent, so the precision is in units of those.
+    Unless the rivals are `far_off`, a start whose steps promise no chance against them, by residual
+    or by Schwarz's criterion, is given up. In a coloured residual few samples are independent, so
+    the precision is in units of those.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
+    count = problem.counted * leading.share
+    price = float(np.log(count)) / count
+    paid = min(  # by Schwarz's criterion
+        fit.objective * float(np.exp(price * (fit.structure.parameters - structure.parameters)))
+        for fit in rivals
+    )
+    if not far_off:  # fits that are about as likely widen the intervals
+        hopeless = min(hopeless, paid * float(np.exp(2 * CLEARLY / count)))
     tried: list[Fit] = []
     for theta in starts:
         fit = fit_structure(
@@ -382,12 +391,7 @@ def best_of(
     best = in_best_sample(problem, best)
     if best.converged or best.objective > TWICE * leading.objective:
         return best
-    count = problem.counted * leading.share
-    price = float(np.log(count)) / count
-    for fit in rivals:  # by Schwarz's criterion
-        paid = np.exp(price * (fit.structure.parameters - structure.parameters))
-        hopeless = min(hopeless, float(paid) * fit.objective)
-    return refit(problem, best, precision=precision, hopeless=hopeless)
+    return refit(problem, best, precision=precision, hopeless=min(hopeless, paid))
 
 
 def in_best_sample(problem: Problem, best: Fit) -> Fit:

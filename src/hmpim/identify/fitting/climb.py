@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.arrays import Mask, Real, parts_of
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.regrouped import regrouped
 from hmpim.identify.worth import TWICE
@@ -94,11 +93,11 @@ def climb(
     """
 
     def descended(best: E) -> tuple[E, bool]:
-        edges = np.cumsum([theta.size for theta in best.thetas])[:-1]
+        sizes = [theta.size for theta in best.thetas]
         damping = _DAMPING
         for _ in range(iterations):
             here = np.concatenate(best.thetas)
-            free, normal, moment, decrement = _free_directions(best, edges, bounded)
+            free, normal, moment, decrement = _free_directions(best, sizes, bounded)
             negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
             if decrement < negligible:
                 return best, True
@@ -108,12 +107,12 @@ def climb(
             while True:
                 step = np.zeros(here.size)
                 step[free] = solved(normal, moment, damping)
-                steps = np.split(step, edges)
+                steps = parts_of(step, sizes)
                 share = min(
                     _limited(s, t, d)
                     for s, t, d in zip(structures, best.thetas, steps, strict=True)
                 )
-                moved = bounded(np.split(here + share * step, edges))
+                moved = bounded(parts_of(here + share * step, sizes))
                 trial = evaluated(moved)
                 taken = (np.concatenate(moved) - here)[free]
                 predicted = float(taken @ (2.0 * moment - normal @ taken))
@@ -145,7 +144,7 @@ def climb(
 
 
 def _free_directions(
-    best: Evaluated, edges: NDArray[np.intp], bounded: Callable[[Sequence[Real]], list[Real]]
+    best: Evaluated, sizes: list[int], bounded: Callable[[Sequence[Real]], list[Real]]
 ) -> tuple[Mask, Real, Real, float]:
     """Parameters that no bound holds, their normal equations, and Newton's decrement.
 
@@ -156,7 +155,7 @@ def _free_directions(
     normal, moment = best.normal()
     here = np.concatenate(best.thetas)
     down = here + _NUDGE * np.sign(moment)
-    free = np.concatenate(bounded(np.split(down, edges))) == down
+    free = np.concatenate(bounded(parts_of(down, sizes))) == down
     if not free.all():
         normal, moment = normal[np.ix_(free, free)], moment[free]
     toward = solved(normal, moment) if free.any() else moment

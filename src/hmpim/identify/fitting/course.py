@@ -323,9 +323,9 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     richer = fit_rich(
         data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
     )
-    if not required and not any(fit.is_white for fit in richer):
+    if not richer or not (required or any(fit.is_white for fit in richer)):
         return course, fitted
-    if richer and course.counted.begins is not None:
+    if course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
         from_rest = refit(data.problem(course.natural, course.given), leading)
         resting = count_in(data, course.natural, [from_rest], course.given, course.known)
@@ -336,9 +336,8 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
             course = replace(course, counted=counted)
             every = _again(course, [*fits, *richer])
             fits, richer = every[: len(fits)], every[len(fits) :]
-    if richer:
-        fits = reduced(course.problem, fits, richer)
-    course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
+    fits = reduced(course.problem, fits, richer)
+    course = replace(course, fits=[*fits, *richer] if plain else richer)
     return course, continue_between(course)
 
 

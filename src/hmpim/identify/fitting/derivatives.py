@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, dots
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.rows import Part, Problem
@@ -88,7 +88,7 @@ def products(
     for own, (first, last) in zip(sums, pairwise((0, *edges, n)), strict=True):
         for here in problem.stretches(first, last):
             rows = rows_at(here) if whole is None else whole[:, here]
-            own += rows @ rows.T
+            own += dots(rows, rows)
     if not others:
         return sums
     gram, last = sums.sum(axis=0), count + len(others)

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hmpim.identify.arrays import Real
+from hmpim.identify.arrays import Real, dots, parts_of
 from hmpim.identify.fitting.climb import Evaluated, climb
 from hmpim.identify.fitting.held_steps import kept_in_sample
 from hmpim.identify.fitting.least_squares import solved, solved_exactly
@@ -128,13 +128,14 @@ class _Known:
         self.target = problem.masked(problem.y)
         self.plain = problem.fixed()
         self.fixed = problem.masked(self.plain)
-        self.gram = self.fixed @ self.fixed.T
+        self.gram = dots(self.fixed, self.fixed)
         self.cross = self.fixed @ self.target
 
 
 def _known(problem: Problem) -> _Known:
-    """These quantities; those of whitened data are kept for the next fits to the same data."""
-    made = recent(_known, problem.y.nbytes) if problem.filtered else None
+    """These quantities; if they take long, they are kept for the next fits to the same data."""
+    costly = problem.filtered or problem.nuisance is not None
+    made = recent(_known, problem.y.nbytes) if costly else None
     if made is None:
         return _Known(problem)
     if problem not in made:
@@ -157,8 +158,8 @@ class _Evaluation:
         self.counted = first.masked(self.rows)
         own = self.counted.shape[0]
         self._gram = np.empty((own + len(known.cross),) * 2)
-        self._gram[:own, :own] = self.counted @ self.counted.T
-        self._gram[own:, :own] = known.fixed @ self.counted.T
+        self._gram[:own, :own] = dots(self.counted, self.counted)
+        self._gram[own:, :own] = dots(known.fixed, self.counted)
         self._gram[:own, own:] = self._gram[own:, :own].T
         self._gram[own:, own:] = known.gram
         if first.source.degree == SAMPLES_ALONE:  # rounding may be the only noise
@@ -177,7 +178,8 @@ class _Evaluation:
 
     def weights(self) -> list[Real]:
         """Linear parameters: numerator and initial state of each input, then the fixed rows'."""
-        return np.split(self.linear, np.cumsum([block.shape[0] for block in self._blocks]))
+        sizes = [block.shape[0] for block in self._blocks]
+        return parts_of(self.linear, [*sizes, self.linear.size - sum(sizes)])
 
     def slopes(self, here: slice) -> Real:
         """Derivatives of the prediction by all delays and denominators, as samples count."""
@@ -203,9 +205,9 @@ class _Evaluation:
         mixed, own = np.zeros((size, self.linear.size)), self.counted.shape[0]
         for here in self.problems[0].stretches(0, self.residual.size):
             rows = self.slopes(here)
-            inner += rows @ rows.T
-            mixed[:, :own] += rows @ self.counted[:, here].T
-            mixed[:, own:] += rows @ self._known.fixed[:, here].T
+            inner += dots(rows, rows)
+            mixed[:, :own] += dots(rows, self.counted[:, here])
+            mixed[:, own:] += dots(rows, self._known.fixed[:, here])
             moment += rows @ self.residual[here]
         return inner - mixed @ solved(self._gram, mixed.T), moment
 

@@ -320,7 +320,7 @@ def grow(
     best: F,
     *,
     hidden: Callable[[F], HiddenPole],
-    refit: Callable[[Structure, Real], F],
+    refit: Callable[[Structure, Real, float], F],
     count: Callable[[HiddenPole, F], float],
     names: tuple[StructureName, ...],
     white: Callable[[F], bool],
@@ -335,7 +335,7 @@ def grow(
     hidden : callable
         Tests a fit for one more pole.
     refit : callable
-        Fits a structure from a start.
+        Fits a structure from a start, given the objective that it must promise to fall below.
     count : callable
         Independent samples for a tested pole, given the fit that has it.
     names : tuple of str
@@ -356,7 +356,10 @@ def grow(
         starts = [float(np.sqrt(test.squared))]
         if test.squared > DEVIATIONS * test.std:  # so far off q = 0 the estimate may be poor
             starts.append(_PROBE * test.scale)
-        tried = [refit(richer, with_pole(structure, best.fit.theta, lag)) for lag in starts]
+        tried: list[F] = []
+        for lag in starts:
+            least = min((one.fit.objective for one in tried), default=np.inf)
+            tried.append(refit(richer, with_pole(structure, best.fit.theta, lag), least))
         found = min(tried, key=lambda f: f.fit.objective)
         samples = count(test, found)
         gain = samples * float(np.log(best.fit.objective / found.fit.objective))

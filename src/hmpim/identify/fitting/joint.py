@@ -232,8 +232,8 @@ def _grown_from(
     return grow(
         trial,
         hidden=lambda tested: course.data.hidden_pole(problem, tested.fit),
-        refit=lambda structure, theta: trial_of(
-            trial.intersample, fit_structure(problem, structure, theta), count
+        refit=lambda structure, theta, hopeless: trial_of(
+            trial.intersample, fit_structure(problem, structure, theta, hopeless=hopeless), count
         ),
         count=samples,
         names=structures,

@@ -165,7 +165,8 @@ def is_exact(u: Real, y: Real) -> bool:
     for most in _GLANCES:
         equations = _equations(u, y, None, most=most)
         allowed = ROUNDING**2 * float(y.var()) * equations.rows
-        if not equations.cost_of_all < allowed:
+        least = equations.factor[-1, -1] ** 2  # the cost, if no direction is left out
+        if not least < allowed or not equations.cost_of_all < allowed:
             return False
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True

@@ -33,8 +33,9 @@ def with_tails(
     joint = alone_of(fleet, member, place, y)
     problem = joint.problem
 
-    def refit(structure: Structure, theta: Real) -> Trial:
-        return trial_of(member.intersample, fit_structure(problem, structure, theta), y.size)
+    def refit(structure: Structure, theta: Real, hopeless: float) -> Trial:
+        fit = fit_structure(problem, structure, theta, hopeless=hopeless)
+        return trial_of(member.intersample, fit, y.size)
 
     growth = grow(
         joint.best,

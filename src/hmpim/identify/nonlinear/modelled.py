@@ -116,6 +116,7 @@ def linear_starts(
     """
     if plain.is_white:
         return [plain]
+    hopeless = joint.best.fit.cost / PART**2  # `kinds_in_question` passes over such a fit
     starts = {}
     if plain.structure.name == "second_order" and plain.delay > 0.0:
         start = np.append(plain.theta, np.log(MOST * plain.delay))
@@ -125,7 +126,7 @@ def linear_starts(
         if trial.fit.structure.name in _SERVOS:
             starts[trial.fit.structure.name] = trial.fit.theta
     servos = [
-        fit_structure(problem, STRUCTURES[name], starts[name])
+        fit_structure(problem, STRUCTURES[name], starts[name], hopeless=hopeless)
         for name in _SERVOS
         if name in starts and name in structures
     ]

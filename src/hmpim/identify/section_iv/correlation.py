@@ -101,12 +101,9 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
     (CorrelationPeak(lag=2, value=0.4...), False, 2)
     """
     n, half = u.size, u.size // 2 + 1
-    length = int(scipy.fft.next_fast_len(2 * n - 1, real=True))
     means, moves = (float(u.mean()), float(y.mean())), y - y.mean()
-    around = scipy.fft.rfft(moves, length)
-    around *= _conjugate(u, length)
-    around = scipy.fft.irfft(around, length, overwrite_x=True)
-    behind, ahead = around[:n], around[length - n + 1 :]
+    around = _around(u, y)
+    behind, ahead = around[:n], around[1 - n :]
     # For the signals as they are, the products of the means are added over the overlap.
     value = behind[:half] + (n - np.arange(half)) * (means[0] * means[1])
     value[1:] -= means[0] * np.cumsum(moves[: half - 1])
@@ -124,6 +121,15 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
         there=float(behind[lag]),
         lead=lead if abs(ahead[lead]) > abs(behind[lag]) else None,
     )
+
+
+@kept
+def _around(u: Real, y: Real) -> Real:
+    """Products of both less their means, summed at every lag: from 0, then those below 0."""
+    length = int(scipy.fft.next_fast_len(2 * u.size - 1, real=True))
+    spectrum = scipy.fft.rfft(y - y.mean(), length)
+    spectrum *= _conjugate(u, length)
+    return np.asarray(scipy.fft.irfft(spectrum, length, overwrite_x=True))
 
 
 @kept
