@@ -52,6 +52,7 @@ from hmpim.identify.result.error_bars import estimate, noise_estimate
 from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.worth import WORTH
+from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.response import response_std
 from hmpim.record import Finding, Signal
 
@@ -139,6 +140,28 @@ class _Followed:
         """The nonlinearity that the model includes, other than a limited speed."""
         return self.joined.bending_of(self.i)
 
+    @property
+    def command(self) -> Real:
+        """The input as recorded."""
+        limited = self.question.limited
+        return self.source.values if limited is None else limited.recorded
+
+    @property
+    def nonlinear_part(self) -> NonlinearPart | None:
+        """What the model includes besides its linear part."""
+        if self.question.limited is not None:
+            return self.question.limited.part(self.question.aligned.fs)
+        return None if self.bending is None else self.bending.part
+
+    def as_recorded(self, fit: Fit) -> tuple[Real, Real]:
+        """Prediction and residual of the output with its disturbance and its changing gain."""
+        prediction, residual = fit.prediction, fit.residual
+        if self.joined.disturbance is not None:
+            prediction = prediction + self.joined.disturbance
+        if self.joined.gaining is not None and self.joined.gaining.taken:
+            residual = residual * self.joined.gaining.course
+        return prediction, residual
+
     def response_to(self, y: Real, fit: Fit) -> FrequencyResponse:
         """Local response; that of an integrator from the output's differences.
 
@@ -156,22 +179,20 @@ class _Followed:
 
 def _pair(own: _Followed) -> PairIdentification:
     """Describe an output that follows an input."""
-    question, joined, aligned = own.question, own.joined, own.question.aligned
-    output, units, bending = question.output, own.units, own.bending
+    question, aligned, output = own.question, own.question.aligned, own.question.output
     joint, censored, covariance = _refined(own)
     plain = plainer(joint) if question.inputs is None and covariance is None else None
-    joint, inspection, unseen = looked_through(question, own.found, joined, joint, own.i, plain)
+    joint, inspection, unseen = looked_through(question, own.found, own.joined, joint, own.i, plain)
     said = () if inspection is None else inspection.findings
-    command = own.source.values if question.limited is None else question.limited.recorded
     y = output.values if own.matrix is None else joint.problem.y
-    paper = paper_estimates(command, y, aligned.fs, band=own.band)
+    paper = paper_estimates(own.command, y, aligned.fs, band=own.band)
     readings = read_parameters(
         joint,
         fs=aligned.fs,
         highest=min(own.band[1], aligned.fs / 2),
         delay_correlation=paper.delay,
         known_covariance=covariance,
-        units=units,
+        units=own.units,
     )
     response = _measured(own, joint, readings)
     bent = partial(possible_bends, question, own.found, joint, own.i, plain, said)
@@ -179,23 +200,16 @@ def _pair(own: _Followed) -> PairIdentification:
     read = partial(_bandwidths, own, joint, readings, response)
     from_response, unread = attempt("response_bandwidths", read, ResponseBandwidths())
     left, untested = attempt("misfit", partial(_left, own, joint), Misfit())
-    evidence = _evidence(own, joint, readings, from_response, left, moves)
-    if inspection is not None and said and bending is None:
-        share = max(inspection.summary.nonlinear, evidence.nonlinear)
-        evidence = replace(evidence, nonlinear=share)
+    evidence = _evidence(own, joint, readings, from_response, left, moves, inspection)
     parameters, seen = with_imperfections(evidence.spanned, own.found, censored, output.unit)
     known = {finding.code for finding in seen}
-    fit, spread = joint.best.fit, _spread(joint)
-    gaining, disturbance = joined.gaining, joined.disturbance
-    course = None if gaining is None or not gaining.taken else gaining.course
-    part = None if bending is None else bending.part
-    if question.limited is not None:
-        part = question.limited.part(aligned.fs)
+    spread = _spread(joint)
+    prediction, residual = own.as_recorded(joint.best.fit)
     numerator, denominator = readings.coefficients
     return PairIdentification(
         input=own.source.name,
         output=output.name,
-        structure=fit.structure.name,
+        structure=joint.best.fit.structure.name,
         intersample=joint.best.intersample,
         fit_percent=evidence.fit_percent,
         parameters=parameters,
@@ -206,7 +220,7 @@ def _pair(own: _Followed) -> PairIdentification:
         candidates=joint.candidates(lambda one: float(fit_percent(one.cost, spread))),
         warnings=(
             *aligned.findings,
-            *_of_the_question(question, units[0]),
+            *_of_the_question(question, own.units[0]),
             *judge(evidence),
             *seen,
             *(finding for finding in said if finding.code not in known),
@@ -215,11 +229,11 @@ def _pair(own: _Followed) -> PairIdentification:
         ),
         from_response=evidence.measured,
         time=aligned.time,
-        prediction=fit.prediction if disturbance is None else fit.prediction + disturbance,
-        residual=fit.residual if course is None else fit.residual * course,
+        prediction=prediction,
+        residual=residual,
         covariance=readings.by_falling_powers,
-        nonlinearity=None if inspection is None else _summary(inspection, bending, units),
-        nonlinear_part=part,
+        nonlinearity=None if inspection is None else _summary(inspection, own.bending, own.units),
+        nonlinear_part=own.nonlinear_part,
     )
 
 
@@ -259,10 +273,14 @@ def _evidence(
     from_response: ResponseBandwidths,
     left: Misfit,
     moves: tuple[Bend, ...],
+    inspection: Inspection | None,
 ) -> Evidence:
     """The evidence that the checks examine."""
     question, joined, fit = own.question, own.joined, joint.best.fit
     fs, known = question.aligned.fs, question.measured
+    nonlinear = max((one.share for one in moves if one.certain), default=0.0)
+    if inspection is not None and inspection.findings and own.bending is None:
+        nonlinear = max(nonlinear, inspection.summary.nonlinear)
     # A change of the gain is not reported with a fit that a nonlinearity has replaced.
     gaining = joined.gaining if fit is joined.fits[own.i].best.fit else None
     evidence = Evidence(
@@ -275,7 +293,7 @@ def _evidence(
         band=own.band,
         fit_percent=float(fit_percent(fit.cost, _spread(joint))),
         bends=moves,
-        nonlinear=max((one.share for one in moves if one.certain), default=0.0),
+        nonlinear=nonlinear,
         measured=from_response,
         held=own.found.hold is not None,
         through=question.instrument is not None,
