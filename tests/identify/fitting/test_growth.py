@@ -156,8 +156,9 @@ def test_noise_that_is_slow_does_not_hide_a_fast_pole(u):
     few = N * effective_share(begun.residual)
     hidden = hidden_pole(problem, begun)
 
-    def refit(structure, theta):
-        return trial_of("bandlimited", fit_structure(problem, structure, theta), few)
+    def refit(structure, theta, hopeless):
+        fit = fit_structure(problem, structure, theta, hopeless=hopeless)
+        return trial_of("bandlimited", fit, few)
 
     growth = grow(
         trial_of("bandlimited", begun, few),

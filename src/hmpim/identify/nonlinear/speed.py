@@ -180,7 +180,8 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
     speed, least = command.fastest, start
     for share in reversed(RATES):
         tried = share * command.fastest
-        starts = (start,) if least is start else (start, least)
+        same = np.array_equal(least.theta, start.theta)
+        starts = (start,) if same else (start, least)
         fit = command.fit(tried, *starts, hopeless=hopeless)
         if fit.cost < least.cost or least is start:
             speed, least = tried, fit
