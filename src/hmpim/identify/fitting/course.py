@@ -24,6 +24,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.tail import fit_with_tail
 from hmpim.identify.fitting.whitening import prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -317,13 +318,16 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     mode, best = min(fitted, key=lambda item: item[1].objective)
     owed = owed_to_input(data.problem(mode, course.counted), best, data)
     required = not plain or owed > MATERIAL or spans_record(best)
-    if not required and owed <= WORTH:
-        return course, fitted
-    fits = course.fits
-    richer = fit_rich(
-        data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
-    )
+    fits, richer = course.fits, list[Fit]()
+    if required or owed > WORTH:
+        richer = fit_rich(
+            data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
+        )
     if not required and not any(fit.is_white for fit in richer):
+        richer = []
+    tailed = _with_tail(course, [*fits, *richer])
+    richer = richer if tailed is None else [*richer, tailed]
+    if not richer and not required:
         return course, fitted
     if richer and course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
@@ -340,6 +344,14 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         fits = reduced(course.problem, fits, richer)
     course = replace(course, fits=[*fits, *richer] if plain else richer or fits)
     return course, continue_between(course)
+
+
+def _with_tail(course: Course, fits: list[Fit]) -> Fit | None:
+    """The best fit with a slow tail, if the record shows one and nothing else is left."""
+    if not course.data.keeps_samples:
+        return None
+    found = fit_with_tail(course.problem, fits, course.others)
+    return found if found is not None and found.is_white else None
 
 
 def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:
