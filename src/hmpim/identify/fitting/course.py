@@ -25,7 +25,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
-from hmpim.identify.fitting.whitening import prewhitened_of
+from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
@@ -347,11 +347,15 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 
 
 def _with_tail(course: Course, fits: list[Fit]) -> Fit | None:
-    """The best fit with a slow tail, if the record shows one and nothing else is left."""
-    if not course.data.keeps_samples:
+    """The best fit with a slow tail, if it leaves white noise or is likelier in coloured noise."""
+    data, problem = course.data, course.problem
+    if not data.keeps_samples:
         return None
-    found = fit_with_tail(course.problem, fits, course.others)
-    return found if found is not None and found.is_white else None
+    found = fit_with_tail(problem, fits, course.others)
+    if found is None or found.is_white:
+        return found
+    best = min(fits, key=lambda fit: fit.objective)
+    return found if is_likelier(data, problem, found, best) else None
 
 
 def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:
