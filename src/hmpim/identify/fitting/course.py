@@ -325,8 +325,7 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         )
     if not required and not any(fit.is_white for fit in richer):
         richer = []
-    tailed = _with_tail(course, [*fits, *richer])
-    richer = richer if tailed is None else [*richer, tailed]
+    richer = [*richer, *_with_tails(course, [*fits, *richer])]
     if not richer and not required:
         return course, fitted
     if richer and course.counted.begins is not None:
@@ -346,16 +345,19 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     return course, continue_between(course)
 
 
-def _with_tail(course: Course, fits: list[Fit]) -> Fit | None:
-    """The best fit with a slow tail, if it leaves white noise or is likelier in coloured noise."""
-    data, problem = course.data, course.problem
-    if not data.keeps_samples:
-        return None
-    found = fit_with_tail(problem, fits, course.others)
-    if found is None or found.is_white:
-        return found
-    best = min(fits, key=lambda fit: fit.objective)
-    return found if is_likelier(data, problem, found, best) else None
+def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
+    """Fits with one slow tail, two, …, while each leaves white noise or is clearly likelier."""
+    data, problem, found = course.data, course.problem, list[Fit]()
+    while data.keeps_samples:
+        every = [*fits, *found]
+        tailed = fit_with_tail(problem, every, course.others)
+        if tailed is None:
+            break
+        best = min(every, key=lambda fit: fit.objective)
+        if not (tailed.is_white or is_likelier(data, problem, tailed, best)):
+            break
+        found.append(tailed)
+    return found
 
 
 def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:

@@ -10,7 +10,7 @@ a given T the log-likelihood is quadratic in d, and a score test of d (C. R. Rao
 Soc. 44, 1948) costs one response.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,10 +26,39 @@ from hmpim.identify.worth import MUCH, WORTH
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 
-__all__ = ["fit_with_tail", "with_tail"]
+__all__ = ["Tail", "fit_with_tail", "hidden_tail", "with_tail"]
 
 _STEP = 3.0
 """Ratio of neighbouring time constants that are tested: responses to them are almost alike."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tail:
+    """A tail that a fit lacks: its time constant in samples, and its size |d|."""
+
+    lag: float
+    size: float
+
+
+def hidden_tail(problem: Problem, fit: Fit, *, share: float = 1.0) -> Tail | None:
+    """Test a fit for a slow tail; None without evidence, or if it is too small to matter.
+
+    Parameters
+    ----------
+    problem, fit : Problem, Fit
+        The data, and a fit to them from rest. One that integrates, is zero at DC or is in
+        mid-motion has no tail that could be told from the rest.
+    share : float
+        Independent samples per sample.
+    """
+    apart = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
+    if apart or fit.initial.size or fit.objective <= 0.0:
+        return None
+    tested = [(*_score(problem, fit, lag), lag) for lag in _lags(fit)]
+    gain, size, lag = max(tested, default=(0.0, 0.0, 0.0))
+    if size <= WORTH or share * gain <= searched(len(tested)):
+        return None
+    return Tail(lag=lag, size=size)
 
 
 def fit_with_tail(
@@ -48,14 +77,11 @@ def fit_with_tail(
     """
     best = min(fits, key=lambda fit: fit.objective)
     richer = with_tail(best.structure, structures)
-    if richer is None or best.initial.size or best.objective <= 0.0:
-        return None
-    tested = [(*_score(problem, best, lag), lag) for lag in _lags(best)]
-    gain, size, lag = max(tested, default=(0.0, 0.0, 0.0))
-    if size <= WORTH or gain <= searched(len(tested)):
+    tail = None if richer is None else hidden_tail(problem, best)
+    if richer is None or tail is None:
         return None
     same = [fit.theta for fit in fits if fit.structure == richer]
-    return best_of(problem, richer, [_start(best, lag), *same], fits)
+    return best_of(problem, richer, [_start(best, tail.lag), *same], fits)
 
 
 def with_tail(
