@@ -206,7 +206,6 @@ _STRUCTURES = {
     "second_order_zeros": "second order with two zeros",
     "third_order_zero": "third order with a zero",
     "third_order_zeros": "third order with two zeros",
-    "fourth_order_zeros": "fourth order with three zeros",
     "two_modes": "two modes",
     "three_modes": "three modes",
     "four_modes": "four modes",

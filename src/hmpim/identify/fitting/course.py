@@ -351,7 +351,7 @@ def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
     while data.keeps_samples:
         every = [*fits, *found]
         tailed = fit_with_tail(problem, every, course.others)
-        if tailed is None:
+        if tailed is None or any(fit.structure == tailed.structure for fit in found):
             break
         best = min(every, key=lambda fit: fit.objective)
         if not (tailed.is_white or is_likelier(data, problem, tailed, best)):

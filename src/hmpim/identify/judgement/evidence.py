@@ -103,7 +103,6 @@ class Evidence:
 
 
 _WORDS = {
-    "fourth_order_zeros": "fourth-order (with three zeros)",
     "integrator_first_order": "lagging integrator",
     "integrator_second_order": "second-order lagging integrator",
     "washout_second_order": "second-order (with a washout)",
