@@ -124,6 +124,7 @@ SYSTEMS = (
     family("Bessel", "Order 2 to 6", k.low_pass("bessel"), SWEEP),
     family("lead", "A zero below its pole", k.lead, SWEEP),
     family("lead-lag", "Two zeros between two poles", k.lead_lag, SWEEP),
+    family("slow tail", "Second order; the last 1 to 6 % settles slowly", k.slow_tail, MIDDLE),
     family("second order with a zero", "In the left half plane", k.with_zero, SWEEP),
     family("non-minimum phase", "A zero in the right half plane", k.non_minimum_phase, SWEEP),
     family("notch", "A narrow one in a second-order lag", k.notch, SWEEP),

@@ -98,6 +98,14 @@ def lead_lag(rng: Rng, drive: Drive) -> System:
     return around(rng, drive, lags=lags, leads=leads)
 
 
+def slow_tail(rng: Rng, drive: Drive) -> System:
+    """Second order, and a last 1 to 6 % that settles slowly, as in a loop with integral action."""
+    pair = (share_of(rng, drive, 0.15, 0.5), float(rng.uniform(0.3, 0.9)))
+    slow = drive.duration * log_uniform(rng, 0.03, 0.2)
+    lead = slow * (1 + float(rng.choice([-1.0, 1.0])) * log_uniform(rng, 0.01, 0.06))
+    return around(rng, drive, pairs=(pair,), lags=(slow,), leads=(lead,))
+
+
 def non_minimum_phase(rng: Rng, drive: Drive) -> System:
     natural = share_of(rng, drive, 0.15, 0.5)
     zero = -0.159 / (natural * rng.uniform(0.7, 3))

@@ -35,6 +35,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import follows
 from hmpim.identify.fitting.joint import chosen_of, joint_fit
+from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -121,7 +122,8 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if found is None or not found[0].related:
         return None
     joint, drifting = found
-    if follows(course.data, joint.best.fit):  # richer dynamics may explain the slow part
+    best = joint.best.fit  # richer dynamics may explain the slow part
+    if follows(course.data, best) or hidden_tail(joint.problem, best) is not None:
         return None
     return OutputFit(fits=(joint,), drifting=drifting)
 

@@ -204,6 +204,7 @@ _STRUCTURES = {
     "second_order_zero": "second order with a zero",
     "first_order_zero": "first order with a zero",
     "second_order_zeros": "second order with two zeros",
+    "third_order_zero": "third order with a zero",
     "third_order_zeros": "third order with two zeros",
     "two_modes": "two modes",
     "three_modes": "three modes",

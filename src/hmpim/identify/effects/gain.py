@@ -127,6 +127,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     least = min(fit.cost, (1.0 - share) * best.cost)
     if (1.0 - otherwise(data, constant)) * constant.cost < least:
         return None
+    elsewhere = _gain_elsewhere(data, constant, tuple(sorted({0.0, lead.score.rate})))
     if not lead.white and best.structure.name not in PLAIN:
         lead = _settled(first, lead.score, fitted, plainly=False) or lead
     score = lead.score
@@ -137,9 +138,11 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
         for one in found
         if one.joint is not lead.joint and one.gained > lead.gained - 2 * CLEARLY
     )
-    # With rich dynamics it may replace a missing pole, and is only a doubt.
+    # With rich dynamics it may replace a missing pole, and is only a doubt; so it is if dynamics
+    # that change explain about as much.
     plain = lead.joint.best.fit.structure.name in PLAIN
-    taken = lead.gained > 2 * CLEARLY and lead.white and plain
+    alone = lead.score.gain > elsewhere + CLEARLY
+    taken = lead.gained > 2 * CLEARLY and lead.white and plain and alone
     return GainChange(
         joint=lead.joint,
         taken=taken,
@@ -278,6 +281,24 @@ def scored(
             )
         )
     return tuple(found)
+
+
+def _gain_elsewhere(problem: Problem, fit: Fit, rates: tuple[float, ...]) -> float:
+    """Gain in log-likelihood by a change of delay or dynamics, and not of the gain.
+
+    Such a change multiplies a derivative of the prediction as one of the gain multiplies its
+    motion. `rates` are as for `scored`.
+    """
+    part = part_of(problem, fit.structure, fit.theta)
+    shapes, most = _shapes(problem.y.size, rates), 0.0
+    for slope in part.slopes(fit.linear[:-1], fit.initial):
+        gram = _products(problem, fit, part, shapes * slope)
+        rest, whole = _projected(gram, len(rates)), gram.diagonal()[-len(rates) - 1 : -1]
+        for k, power in enumerate(whole):
+            if rest[k, k] > _ALIKE * power and rest[-1, -1] > 0.0:
+                taken = float(rest[k, -1] ** 2 / rest[k, k] / rest[-1, -1])
+                most = max(most, min(taken, 1.0 - np.finfo(float).eps))
+    return -0.5 * problem.counted * float(np.log1p(-most))
 
 
 def _products(problem: Problem, fit: Fit, part: Part | SampledPart, rows: Real) -> Real:

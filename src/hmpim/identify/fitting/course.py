@@ -24,7 +24,8 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
-from hmpim.identify.fitting.whitening import prewhitened_of
+from hmpim.identify.fitting.tail import fit_with_tail
+from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName
@@ -317,13 +318,15 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     mode, best = min(fitted, key=lambda item: item[1].objective)
     owed = owed_to_input(data.problem(mode, course.counted), best, data)
     required = not plain or owed > MATERIAL or spans_record(best)
-    if not required and owed <= WORTH:
-        return course, fitted
-    fits = course.fits
-    richer = fit_rich(
-        data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
-    )
-    if not richer or not (required or any(fit.is_white for fit in richer)):
+    fits, richer = course.fits, list[Fit]()
+    if required or owed > WORTH:
+        richer = fit_rich(
+            data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
+        )
+    if not required and not any(fit.is_white for fit in richer):
+        richer = []
+    richer = [*richer, *_with_tails(course, [*fits, *richer])]
+    if not richer:
         return course, fitted
     if course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
@@ -339,6 +342,21 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     fits = reduced(course.problem, fits, richer)
     course = replace(course, fits=[*fits, *richer] if plain else richer)
     return course, continue_between(course)
+
+
+def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
+    """Fits with one slow tail, two, …, while each leaves white noise or is clearly likelier."""
+    data, problem, found = course.data, course.problem, list[Fit]()
+    while data.keeps_samples:
+        every = [*fits, *found]
+        tailed = fit_with_tail(problem, every, course.others)
+        if tailed is None or any(fit.structure == tailed.structure for fit in found):
+            break
+        best = min(every, key=lambda fit: fit.objective)
+        if not (tailed.is_white or is_likelier(data, problem, tailed, best)):
+            break
+        found.append(tailed)
+    return found
 
 
 def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:

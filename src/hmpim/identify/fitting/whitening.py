@@ -5,15 +5,17 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hmpim.identify.fitting.data import Counted, Data, follows
+from hmpim.identify.chance import CLEARLY
+from hmpim.identify.fitting.data import Counted, Data, follows, refit
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
+from hmpim.identify.fitting.trial import schwarz
 from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART
 from hmpim.record import Intersample
 
-__all__ = ["prewhitened_of", "weighed_by_noise"]
+__all__ = ["is_likelier", "prewhitened_of", "weighed_by_noise"]
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted) -> Data | None:
@@ -52,3 +54,20 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     if noise.size == 1 and level is None:
         return data.plain
     return replace(data, noise=noise, level=level)
+
+
+def is_likelier(data: Data, problem: Problem, found: Fit, best: Fit) -> bool:
+    """Whether a richer fit is clearly likelier than the best one, each in noise of its own colour.
+
+    In a common colour the comparison would favour the fit whose residual it is.
+    """
+
+    def criterion(fit: Fit) -> float:
+        noise = data.noise_left(problem, fit)
+        coloured = problem.coloured(noise)
+        again = refit(coloured, fit)
+        parameters = fit.structure.parameters + noise.size - 1
+        count = problem.counted  # the samples before the first whitened ones are so few
+        return schwarz(again.objective * count / coloured.counted, count, parameters)
+
+    return criterion(best) - criterion(found) > 2 * CLEARLY

@@ -11,7 +11,7 @@ from hmpim.identify.judgement.errors import not_converged, weak_delay, weak_exci
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.judgement.feedback import feedback
 from hmpim.identify.judgement.response import bandwidth_disagrees, grazed_bandwidth
-from hmpim.identify.judgement.structure import missed_pole, other_order
+from hmpim.identify.judgement.structure import missed_pole, missed_tail, other_order
 from hmpim.identify.judgement.verdict import UNKNOWN, doubted
 from hmpim.record import Finding
 
@@ -40,6 +40,7 @@ CHECKS: tuple[Check, ...] = (
     residual.halves_disagree,
     other_order,
     missed_pole,
+    missed_tail,
     other_intersample,
     wide_span,
     reach.short_record,

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from hmpim.identify.chance import DEVIATIONS, LIKELIER
+from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import asked_rivals, plainer_rivals
-from hmpim.identify.result.groups import PHASE_SPLIT
-from hmpim.identify.worth import MOST, TOLERATED
+from hmpim.identify.result.groups import AT_DC, PHASE_SPLIT
+from hmpim.identify.worth import MATERIAL, MOST, TOLERATED
 from hmpim.record import Finding
 
-__all__ = ["ALMOST", "barely_distinguished", "missed_pole", "other_order"]
+__all__ = ["ALMOST", "barely_distinguished", "missed_pole", "missed_tail", "other_order"]
 
 ALMOST = DEVIATIONS - 1.0
 """Standard deviations from which another run may require other dynamics."""
@@ -116,3 +117,25 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
             f"The record almost requires dynamics other than {poles}: {level}. {close}"
             "Lower the noise, or sweep higher."
         )
+
+
+def missed_tail(evidence: Evidence) -> Iterator[Finding]:
+    """Doubt the figures at DC if the record shows a slow tail that the model lacks.
+
+    The response within the band hardly changes with it.
+    """
+    joint, fs = evidence.joint, evidence.fs
+    if evidence.nonlinear > MOST or not evidence.has_samples:
+        return
+    tail = hidden_tail(joint.weighed, joint.best.fit, share=joint.weighed_share)
+    if tail is None or tail.size <= MATERIAL:
+        return
+    yield Finding(
+        code="other_dynamics",
+        message="The record requires slower dynamics than the model has: the output settles by "
+        f"{100 * tail.size:.2g} % with a time constant of about {tail.lag / fs:.2g} s, and no "
+        "structure that may be chosen describes that. The figures at DC may be off by as much. "
+        "Sweep lower, or record longer.",
+        severity="doubt",
+        parameters=AT_DC,
+    )

@@ -6,6 +6,7 @@ from hmpim.identify.result.measured import ResponseBandwidths
 from hmpim.identify.result.parameters import Parameters
 
 __all__ = [
+    "AT_DC",
     "BANDWIDTHS",
     "EVERY",
     "FIXED_UNITS",
@@ -44,6 +45,15 @@ PHASE_SPLIT = (
 The response within the band does not depend on that, nor do gain, bandwidths that include the
 delay, and the slope of the phase at DC.
 """
+
+AT_DC = (
+    "scale_factor",
+    "time_constant",
+    "delay_low_frequency",
+    "bandwidth_3db",
+    "peak_gain_db",
+)
+"""Parameters at DC, or relative to the gain there, and the slowest time constant."""
 
 BANDWIDTHS = tuple(f.name for f in fields(ResponseBandwidths))
 """Every bandwidth."""

@@ -1,0 +1,131 @@
+"""A slow tail: one more pole, much slower than the others, with a zero close to it.
+
+A loop with an integral action, a bearing that creeps and a sensor that warms itself settle in the
+end by a per cent or so:
+
+    (1 + (1 + d) sT) / (1 + sT) = 1 + d - d / (1 + sT).
+
+A sweep spends a few bins at frequencies around 1/T, too few to show in a test without a model. For
+a given T the log-likelihood is quadratic in d, and a score test of d (C. R. Rao, Proc. Camb. Phil.
+Soc. 44, 1948) costs one response.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmpim.identify.arrays import Real
+from hmpim.identify.chance import searched
+from hmpim.identify.fitting.candidates import best_of
+from hmpim.identify.fitting.derivatives import products
+from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.growth import one_more_pole, with_pole
+from hmpim.identify.fitting.least_squares import added
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.worth import MUCH, WORTH
+from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
+from hmpim.model.response import slowest_time_constant
+
+__all__ = ["Tail", "fit_with_tail", "hidden_tail", "with_tail"]
+
+_STEP = 3.0
+"""Ratio of neighbouring time constants that are tested: responses to them are almost alike."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tail:
+    """A tail that a fit lacks: its time constant in samples, and its size |d|."""
+
+    lag: float
+    size: float
+
+
+def hidden_tail(problem: Problem, fit: Fit, *, share: float = 1.0) -> Tail | None:
+    """Test a fit for a slow tail; None without evidence, or if it is too small to matter.
+
+    Parameters
+    ----------
+    problem, fit : Problem, Fit
+        The data, and a fit to them from rest. One that integrates, is zero at DC or is in
+        mid-motion has no tail that could be told from the rest.
+    share : float
+        Independent samples per sample.
+    """
+    apart = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
+    if apart or fit.initial.size or fit.objective <= 0.0:
+        return None
+    tested = [(*_score(problem, fit, lag), lag) for lag in _lags(fit)]
+    gain, size, lag = max(tested, default=(0.0, 0.0, 0.0))
+    if size <= WORTH or share * gain <= searched(len(tested)):
+        return None
+    return Tail(lag=lag, size=size)
+
+
+def fit_with_tail(
+    problem: Problem, fits: list[Fit], structures: tuple[StructureName, ...]
+) -> Fit | None:
+    """Add a slow pole and its zero to the best fit; None if the record shows no tail.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    fits : list of Fit
+        All fits to them so far.
+    structures : tuple of str
+        Structures that may be tried.
+    """
+    best = min(fits, key=lambda fit: fit.objective)
+    richer = with_tail(best.structure, structures)
+    tail = None if richer is None else hidden_tail(problem, best)
+    if richer is None or tail is None:
+        return None
+    same = [fit.theta for fit in fits if fit.structure == richer]
+    return best_of(problem, richer, [_start(best, tail.lag), *same], fits)
+
+
+def with_tail(
+    structure: Structure, structures: tuple[StructureName, ...] = tuple(STRUCTURES)
+) -> Structure | None:
+    """Return the least structure with one more pole and one more zero; None if there is none.
+
+    Examples
+    --------
+    >>> with_tail(STRUCTURES["static"]).name, with_tail(STRUCTURES["second_order"]).name
+    ('first_order_zero', 'third_order_zero')
+    """
+    if structure.integrators or structure.dc_zeros or structure.parallel or structure.sampled:
+        return None
+    sections, zeros = one_more_pole(structure).sections, structure.zeros + 1
+    known = [STRUCTURES[name] for name in structures]
+    alike = [s for s in known if s.sections == sections and not (s.parallel or s.dc_zeros)]
+    enough = [s for s in alike if s.zeros >= zeros and not s.integrators]
+    return min(enough, key=lambda s: s.zeros, default=None)
+
+
+def _lags(fit: Fit) -> list[float]:
+    """Time constants in samples, from that of the fit up to a part of the record."""
+    longest = MUCH * fit.residual.size
+    slowest = max(slowest_time_constant(fit.denominator), 1.0)
+    count = int(np.log(max(longest / slowest, 1.0)) / np.log(_STEP))
+    return [slowest * _STEP ** (k + 1) for k in range(count)]
+
+
+def _start(fit: Fit, lag: float) -> Real:
+    """Parameters of the fit with a slow pole in addition."""
+    return np.append(fit.theta[0], with_pole(fit.structure, fit.theta, lag)[1:])
+
+
+def _score(problem: Problem, fit: Fit, lag: float) -> tuple[float, float]:
+    """Gain in log-likelihood by a tail of one time constant, and its size |d|."""
+    richer = replace(one_more_pole(fit.structure), zeros=fit.structure.zeros)
+    row = part_of(problem, richer, _start(fit, lag)).driven(fit.numerator)
+    residual = problem.innovations(fit.prediction, fit.residual)
+    gram = products(problem, fit, residual, row)[0]
+    _, power, along = added(
+        gram[:-2, :-2], gram[:-2, -2], gram[-2, -2], gram[:-2, -1], gram[-2, -1]
+    )
+    if not power > np.finfo(float).eps * gram[-2, -2]:
+        return 0.0, 0.0
+    share = min(float(along**2 / power / gram[-1, -1]), 1.0 - np.finfo(float).eps)
+    return -0.5 * problem.counted * float(np.log1p(-share)), abs(float(along / power))
