@@ -10,9 +10,10 @@ a given T the log-likelihood is quadratic in d, and a score test of d (C. R. Rao
 Soc. 44, 1948) costs one response.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import searched
@@ -22,6 +23,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
 from hmpim.identify.fitting.least_squares import added
 from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.identify.kept import kept
 from hmpim.identify.worth import MUCH, WORTH
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
@@ -52,13 +54,13 @@ def hidden_tail(problem: Problem, fit: Fit, *, share: float = 1.0) -> Tail | Non
         Independent samples per sample.
     """
     apart = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
-    if apart or fit.initial.size or fit.objective <= 0.0:
+    if apart or fit.initial.size or fit.objective <= 0.0 or not _lags(fit).size:
         return None
-    tested = [(*_score(problem, fit, lag), lag) for lag in _lags(fit)]
-    gain, size, lag = max(tested, default=(0.0, 0.0, 0.0))
-    if size <= WORTH or share * gain <= searched(len(tested)):
+    lags, gains, sizes = _scores(problem, fit)
+    k = int(np.argmax(gains))
+    if sizes[k] <= WORTH or share * gains[k] <= searched(lags.size):
         return None
-    return Tail(lag=lag, size=size)
+    return Tail(lag=float(lags[k]), size=float(sizes[k]))
 
 
 def fit_with_tail(
@@ -103,12 +105,11 @@ def with_tail(
     return min(enough, key=lambda s: s.zeros, default=None)
 
 
-def _lags(fit: Fit) -> list[float]:
-    """Time constants in samples, from that of the fit up to a part of the record."""
-    longest = MUCH * fit.residual.size
+def _lags(fit: Fit) -> Real:
+    """Time constants in samples, from more than that of the fit to part of the record, (q,)."""
     slowest = max(slowest_time_constant(fit.denominator), 1.0)
-    count = int(np.log(max(longest / slowest, 1.0)) / np.log(_STEP))
-    return [slowest * _STEP ** (k + 1) for k in range(count)]
+    steps = np.log(max(MUCH * fit.residual.size / slowest, 1.0)) / np.log(_STEP)
+    return np.asarray(slowest * _STEP ** np.arange(1.0, int(steps) + 1.0))
 
 
 def _start(fit: Fit, lag: float) -> Real:
@@ -116,16 +117,34 @@ def _start(fit: Fit, lag: float) -> Real:
     return np.append(fit.theta[0], with_pole(fit.structure, fit.theta, lag)[1:])
 
 
-def _score(problem: Problem, fit: Fit, lag: float) -> tuple[float, float]:
-    """Gain in log-likelihood by a tail of one time constant, and its size |d|."""
-    richer = replace(one_more_pole(fit.structure), zeros=fit.structure.zeros)
-    row = part_of(problem, richer, _start(fit, lag)).driven(fit.numerator)
+@kept
+def _scores(problem: Problem, fit: Fit) -> tuple[Real, Real, Real]:
+    """Time constants in samples, the gain in log-likelihood by each, and the size |d|, all (q,)."""
+    lags = _lags(fit)
+    part = part_of(problem, fit.structure, fit.theta)
+    moved = part.driven(fit.linear[:-1])
     residual = problem.innovations(fit.prediction, fit.residual)
-    gram = products(problem, fit, residual, row)[0]
-    _, power, along = added(
-        gram[:-2, :-2], gram[:-2, -2], gram[-2, -2], gram[:-2, -1], gram[-2, -1]
+    rows = [_lagging(moved, lag) for lag in lags]
+    gram = products(problem, fit, residual, *rows, part=part)[0]
+    first, last = len(gram) - 1 - lags.size, len(gram) - 1
+    own = gram[first:last, first:last]
+    _, rest, along = added(
+        gram[:first, :first],
+        gram[first:last, :first],
+        own,
+        gram[:first, last],
+        gram[first:last, last],
     )
-    if not power > np.finfo(float).eps * gram[-2, -2]:
-        return 0.0, 0.0
-    share = min(float(along**2 / power / gram[-1, -1]), 1.0 - np.finfo(float).eps)
-    return -0.5 * problem.counted * float(np.log1p(-share)), abs(float(along / power))
+    power = rest.diagonal()
+    known = power > np.finfo(float).eps * own.diagonal()
+    sizes = np.where(known, np.abs(along), 0.0) / np.where(known, power, 1.0)
+    shares = np.minimum(sizes**2 * power / gram[last, last], 1.0 - np.finfo(float).eps)
+    gains = -0.5 * problem.counted * np.log1p(-np.where(known, shares, 0.0))
+    return lags, gains, sizes
+
+
+def _lagging(x: Real, lag: float) -> Real:
+    """What a signal moves behind 1/(1 + sT), (n,), which is linear between its samples."""
+    decay = float(np.exp(-1.0 / lag))
+    weights = [1.0 - lag * (1.0 - decay), lag * (1.0 - decay) - decay]
+    return np.asarray(scipy.signal.lfilter(weights, [1.0, -decay], x - x[0]))
