@@ -14,7 +14,7 @@ from hmpim.identify.kept import keeping
 from hmpim.identify.nonlinearities import fit_output, model_nonlinearity
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.preparation.clocks import settled_between
-from hmpim.identify.preparation.glitches import leave_out_glitches
+from hmpim.identify.preparation.lost import leave_out_lost
 from hmpim.identify.preparation.question import Question, recognise_software
 from hmpim.identify.preparation.reference import aligned_with_reference
 from hmpim.identify.preparation.refusals import (
@@ -167,7 +167,7 @@ def identify_output(question: Question) -> Described:
     """Identify one output against every input, jointly if there are several."""
     if not question.moves:
         return describe_dead(question)
-    question = leave_out_glitches(question)
+    question = leave_out_lost(question)
     question = recognise_software(mark_swapped(question))
     seen = look(question)
     seen, fitted = fit_output(question, seen)

@@ -1,0 +1,267 @@
+"""Samples that the recorder lost or changed, and the unit never responded to.
+
+A recorder may lose a word, repeat the last one, stand still, or write a fixed word for "no value".
+In an input, such samples look like motion, to which a response is missing everywhere in the model.
+But an input may also contain a pulse, as an impact test does, or stand still on purpose, as a
+trapezoid does. The output tells which: plain dynamics are fitted to the record as it is and to the
+record without these samples, and the likelier of the two is kept.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import searched
+from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.effects.imperfections import Imperfections
+from hmpim.identify.effects.lost_samples import find_repeated
+from hmpim.identify.fits import counted_in, fit_once, imperfections_of
+from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
+from hmpim.identify.preparation.question import Question
+from hmpim.identify.worth import TWICE
+from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
+from hmpim.record.runs import runs_of
+
+__all__ = ["find_pulses", "find_standstills", "leave_out_lost"]
+
+_LONGEST = 3
+"""Most samples of a pulse whose values differ, as of a spike of the output."""
+
+_AROUND = 25
+"""Samples on either side with which a pulse is compared."""
+
+_FEWEST_EQUAL = 8
+"""Equal samples in a row from which an input may stand still."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Suspect:
+    """A question without the samples of one kind that may be lost."""
+
+    question: Question
+    finding: Finding
+
+
+def leave_out_lost(question: Question) -> Question:
+    """Take samples for lost if plain dynamics without them are clearly likelier.
+
+    Not in loops, where the noise moves the input, and not for stated software.
+    """
+    if question.instrument is not None or question.intersample == "sampled":
+        return question
+    trial = _Trial(question)
+    trial.let(_words(question))
+    for i in range(len(question.aligned.inputs)):
+        for kind in (_pulses, _repeats, _standstills):
+            trial.let(kind(trial.question, i))
+    return trial.question
+
+
+def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
+    """Return samples, (n,), at which a signal moves out and back as fast as nowhere nearby.
+
+    Both steps must be twice the largest of 25 steps before and after. A pulse has up to three
+    samples, or any number that are equal; with `equal`, it has more than three. None if there are
+    no pulses.
+
+    Examples
+    --------
+    >>> x = np.sin(np.arange(500) ** 2 / 5000)
+    >>> find_pulses(x, np.ones(500, dtype=bool)) is None
+    True
+    >>> x[[100, 300, 301]] += 5.0
+    >>> np.flatnonzero(find_pulses(x, np.ones(500, dtype=bool))).tolist()
+    [100, 300, 301]
+    """
+    size, moves = x.size, np.diff(x)
+    first, last = runs_of(np.concatenate([[False], moves == 0.0]))
+    long = last - first >= _LONGEST
+    begins, ends = [first[long] - 1], [last[long]]
+    for length in () if equal else range(1, _LONGEST + 1):
+        begins.append(np.arange(1, size - length))
+        ends.append(np.arange(1, size - length) + length)
+    begin, end = np.concatenate(begins), np.concatenate(ends)
+    inside = (begin > 0) & (end < size)
+    begin, end = begin[inside], end[inside]
+    # Of the _AROUND steps that end with step k, at place k + _AROUND.
+    largest = maximum_filter1d(np.pad(np.abs(moves), _AROUND), _AROUND, origin=_AROUND // 2)
+    usual = np.maximum(largest[begin + _AROUND - 2], largest[end + 2 * _AROUND - 1])
+    out, back = moves[begin - 1], -moves[end - 1]
+    fast = np.minimum(np.abs(out), np.abs(back)) > TWICE * usual
+    found = np.zeros(size, dtype=bool)
+    for a, b in zip(begin[fast & (out * back > 0.0)], end[fast & (out * back > 0.0)], strict=True):
+        if valid[a - 1 : b + 1].all():
+            found[a:b] = True
+    return found if found.any() else None
+
+
+def find_standstills(x: Real) -> Mask | None:
+    """Return samples, (n,), at which a signal stands still that moves before and after, or None.
+
+    The first sample of a standstill is not among them.
+
+    Examples
+    --------
+    >>> x = np.sin(np.arange(500) / 20)
+    >>> find_standstills(x) is None
+    True
+    >>> x[200:220] = x[200]
+    >>> np.flatnonzero(find_standstills(x))[[0, -1]].tolist()
+    [201, 219]
+    """
+    stands = np.concatenate([[False], np.diff(x) == 0.0])
+    found = np.zeros(x.size, dtype=bool)
+    for a, b in zip(*runs_of(stands), strict=True):
+        around = np.concatenate([stands[max(a - _AROUND, 0) : a], stands[b : b + _AROUND]])
+        if b - a + 1 >= _FEWEST_EQUAL and around.size == 2 * _AROUND and not around[1:].any():
+            found[a:b] = True
+    return found if found.any() else None
+
+
+@dataclass(slots=True)
+class _Trial:
+    """The question, and the plain fits to it once they are needed."""
+
+    question: Question
+    seen: Imperfections = field(init=False)
+    fitted: OutputFit | None = None
+
+    def __post_init__(self) -> None:
+        self.seen = Imperfections()
+
+    def let(self, suspect: _Suspect | None) -> None:
+        """Keep the question without the suspect samples, if there are any, if clearly likelier."""
+        if suspect is None or not _moves(suspect.question):
+            return
+        if self.fitted is None:
+            inputs = [source.values for source in self.question.aligned.inputs]
+            self.seen = imperfections_of(self.question, inputs=inputs)
+            self.fitted = _fitted(self.question, self.seen)
+        again = _fitted(suspect.question, self.seen)
+        if self._gain(suspect.question, again) > searched(self.question.output.values.size):
+            aligned = suspect.question.aligned
+            said = replace(aligned, findings=(*aligned.findings, suspect.finding))
+            self.question, self.fitted = replace(suspect.question, aligned=said), again
+
+    def _gain(self, mended: Question, again: OutputFit) -> float:
+        """Log-likelihood that the samples gain which count in the mended record."""
+        assert self.fitted is not None
+        fits = [fit for fit in (*self.fitted.fits, *again.fits) if fit.related]
+        related = [fit for fit in again.fits if fit.related]
+        counts = np.ones(mended.output.values.size, dtype=bool)
+        counts[: max((fit.forgotten for fit in fits), default=0)] = False
+        masks = [fit.problem.valid for fit in related] + [counted_in(mended, self.seen)]
+        for mask in masks:
+            if mask is not None:
+                counts &= mask
+        if not related or not counts.any():
+            return 0.0
+        y = self.question.output.values
+        rest, left = (np.var((y - f.prediction)[counts]) for f in (self.fitted, again))
+        if rest <= left or left == 0.0:
+            return 0.0
+        share = min(fit.effective_share for fit in related)
+        return 0.5 * share * np.count_nonzero(counts) * float(np.log(rest / left))
+
+
+def _moves(question: Question) -> bool:
+    """Whether the output and every input still move."""
+    inputs = question.aligned.inputs
+    return question.moves and all(np.ptp(source.values) > 0.0 for source in inputs)
+
+
+def _fitted(question: Question, seen: Imperfections) -> OutputFit:
+    """Plain dynamics, or an integrator."""
+    names = tuple(name for name in question.structures if name in (*PLAIN, *INTEGRATING))
+    return fit_once(question, seen, names or question.structures)
+
+
+def _words(question: Question) -> _Suspect | None:
+    """The output without words that repeat, far from the values around them."""
+    output = question.output
+    found = find_pulses(output.values, output.valid, equal=True)
+    if found is None:
+        return None
+    value = output.values[np.argmax(found)]
+    finding = _finding(
+        "fixed_word",
+        f"The output {output.name!r} stays far from the values around over {_samples(found)}, the "
+        f"first at {value:.6g}; they are left out. Look for a word that means 'no value', or for "
+        "loose contacts.",
+    )
+    left = replace(output, valid=output.valid & ~found)
+    return _Suspect(question=replace(question, output=left), finding=finding)
+
+
+def _pulses(question: Question, i: int) -> _Suspect | None:
+    """An input without short pulses."""
+    source, aligned = question.aligned.inputs[i], question.aligned
+    found = find_pulses(source.values, source.valid)
+    if found is None:
+        return None
+    finding = _finding(
+        "input_spikes",
+        f"The input {source.name!r} moves far out and back within {_samples(found)}, the first "
+        f"{aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but the "
+        "output does not respond: they count as lost. Look for lost bits or loose contacts.",
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _repeats(question: Question, i: int) -> _Suspect | None:
+    """An input without samples that repeat the one before."""
+    source = question.aligned.inputs[i]
+    found = find_repeated(source.values)
+    if found is None:
+        return None
+    finding = _finding(
+        "input_repeated",
+        f"The input {source.name!r} repeats the sample before to the last digit at "
+        f"{_samples(found)}, but the output shows that it moved: they count as lost. Look for "
+        "lost frames.",
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _standstills(question: Question, i: int) -> _Suspect | None:
+    """An input without stretches at which it stands still."""
+    source = question.aligned.inputs[i]
+    found = find_standstills(source.values)
+    if found is None:
+        return None
+    finding = _finding(
+        "input_frozen",
+        f"The input {source.name!r} stands still over {_samples(found)}, but the output shows that "
+        "it moved: they count as lost. Look for lost updates.",
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _samples(found: Mask) -> str:
+    count = int(np.count_nonzero(found))
+    return f"{count} sample{'s' if count > 1 else ''} ({100 * count / found.size:.2g} %)"
+
+
+def _finding(code: str, message: str) -> Finding:
+    return Finding(code=code, message=message, severity="info", parameters=())
+
+
+def _without(question: Question, i: int, lost: Mask) -> Question:
+    """The question with these samples of input `i` filled in."""
+    aligned = question.aligned
+    source = _filled(question, aligned.inputs[i], aligned.inputs[i].valid & ~lost)
+    inputs = (*aligned.inputs[:i], source, *aligned.inputs[i + 1 :])
+    return replace(question, aligned=replace(aligned, inputs=inputs))
+
+
+def _filled(question: Question, source: Signal, known: Mask) -> Signal:
+    """An input of which only these samples are known."""
+    aligned = question.aligned
+    channel = Channel(name=source.name, time=aligned.time[known], values=source.values[known])
+    clock = fit_clock(channel.time, nominal=aligned.fs)
+    values, valid = on_grid(
+        channel, clock, aligned.time, fs=aligned.fs, intersample=question.intersample
+    )
+    return replace(source, values=values, valid=valid)
