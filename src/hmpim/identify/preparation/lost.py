@@ -13,16 +13,18 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import searched
+from hmpim.identify.chance import CLEARLY, searched
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.effects.lost_samples import find_repeated
+from hmpim.identify.effects.lost_samples import find_repeated, find_spikes
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import TWICE
 from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
+from hmpim.record.resample import share_above
 from hmpim.record.runs import runs_of
+from hmpim.record.slower import updates
 
 __all__ = ["find_pulses", "find_standstills", "leave_out_lost"]
 
@@ -35,6 +37,12 @@ _AROUND = 25
 _FEWEST_EQUAL = 8
 """Equal samples in a row from which an input may stand still."""
 
+_SMOOTH = 0.4
+"""Frequency, over the rate of a slow recorder, below which it reads a smooth input faithfully."""
+
+_FOLDED = 0.001
+"""Share of the power above it, 3 % of the amplitude, from which the input is not smooth."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Suspect:
@@ -42,6 +50,7 @@ class _Suspect:
 
     question: Question
     finding: Finding
+    otherwise: Finding | None = None  # if the record does not decide
 
 
 def leave_out_lost(question: Question) -> Question:
@@ -54,7 +63,7 @@ def leave_out_lost(question: Question) -> Question:
     trial = _Trial(question)
     trial.let(_words(question))
     for i in range(len(question.aligned.inputs)):
-        for kind in (_pulses, _repeats, _standstills):
+        for kind in (_pulses, _repeats, _standstills, _slow_log):
             trial.let(kind(trial.question, i))
     return trial.question
 
@@ -140,30 +149,39 @@ class _Trial:
             self.seen = imperfections_of(self.question, inputs=inputs)
             self.fitted = _fitted(self.question, self.seen)
         again = _fitted(suspect.question, self.seen)
-        if self._gain(suspect.question, again) > searched(self.question.output.values.size):
-            aligned = suspect.question.aligned
-            said = replace(aligned, findings=(*aligned.findings, suspect.finding))
-            self.question, self.fitted = replace(suspect.question, aligned=said), again
+        spikes = find_spikes(self.question.output.values, again.prediction)
+        if spikes is not None and self.seen.spikes is None:
+            self.seen = replace(self.seen, spikes=spikes)
+            self.fitted = _fitted(self.question, self.seen)
+            again = _fitted(suspect.question, self.seen)
+        gain = self._gain(suspect.question, self.fitted, again)
+        if gain > searched(self.question.output.values.size):
+            self.question, self.fitted = _with(suspect.question, suspect.finding), again
+        elif abs(gain) < CLEARLY and suspect.otherwise is not None:
+            self.question = _with(self.question, suspect.otherwise)
 
-    def _gain(self, mended: Question, again: OutputFit) -> float:
+    def _gain(self, mended: Question, before: OutputFit, after: OutputFit) -> float:
         """Log-likelihood that the samples gain which count in the mended record."""
-        assert self.fitted is not None
-        fits = [fit for fit in (*self.fitted.fits, *again.fits) if fit.related]
-        related = [fit for fit in again.fits if fit.related]
+        related = [fit for fit in after.fits if fit.related]
+        if not related:
+            return -np.inf
+        fits = [fit for fit in (*before.fits, *related) if fit.related]
         counts = np.ones(mended.output.values.size, dtype=bool)
-        counts[: max((fit.forgotten for fit in fits), default=0)] = False
-        masks = [fit.problem.valid for fit in related] + [counted_in(mended, self.seen)]
-        for mask in masks:
+        counts[: max(fit.forgotten for fit in fits)] = False
+        for mask in (*(fit.problem.valid for fit in related), counted_in(mended, self.seen)):
             if mask is not None:
                 counts &= mask
-        if not related or not counts.any():
-            return 0.0
         y = self.question.output.values
-        rest, left = (np.var((y - f.prediction)[counts]) for f in (self.fitted, again))
-        if rest <= left or left == 0.0:
-            return 0.0
+        rest, left = (np.var((y - fitted.prediction)[counts]) for fitted in (before, after))
+        if not counts.any() or left == 0.0 or rest == 0.0:
+            return -np.inf
         share = min(fit.effective_share for fit in related)
         return 0.5 * share * np.count_nonzero(counts) * float(np.log(rest / left))
+
+
+def _with(question: Question, finding: Finding) -> Question:
+    aligned = question.aligned
+    return replace(question, aligned=replace(aligned, findings=(*aligned.findings, finding)))
 
 
 def _moves(question: Question) -> bool:
@@ -237,6 +255,38 @@ def _standstills(question: Question, i: int) -> _Suspect | None:
         "it moved: they count as lost. Look for lost updates.",
     )
     return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _slow_log(question: Question, i: int) -> _Suspect | None:
+    """A smooth input that the recorder reads by a slower clock, joined between its readings."""
+    source, fs = question.aligned.inputs[i], question.aligned.fs
+    at = updates(source.values)
+    if at is None or question.intersample is not None or not source.valid.all():
+        return None
+    slow = fs * (at.size - 1) / float(at[-1] - at[0])
+    if share_above(source.values[at], fs=slow, limit=_SMOOTH * slow) > _FOLDED:
+        return None
+    finding = _finding(
+        "input_slow",
+        f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output shows that "
+        "it moves between these samples: it is interpolated.",
+    )
+    otherwise = Finding(
+        code="input_slow",
+        message=f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
+        f"it moved smoothly and is only recorded so slowly, the delay is {0.5 / slow:.3g} s "
+        "longer. This record does not distinguish the two: state which with intersample=, or "
+        "record the input faster.",
+        severity="doubt",
+        parameters=("delay", "delay_correlation", "delay_low_frequency", "bandwidth_phase90"),
+    )
+    known = np.zeros(source.valid.size, dtype=bool)
+    known[at] = True
+    read = replace(_filled(question, source, known), valid=source.valid)
+    inputs = (*question.aligned.inputs[:i], read, *question.aligned.inputs[i + 1 :])
+    aligned = replace(question.aligned, inputs=inputs)
+    smooth = replace(question, aligned=aligned, intersample="bandlimited")
+    return _Suspect(question=smooth, finding=finding, otherwise=otherwise)
 
 
 def _samples(found: Mask) -> str:
