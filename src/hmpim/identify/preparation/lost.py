@@ -134,11 +134,8 @@ class _Trial:
     """The question, and the plain fits to it once they are needed."""
 
     question: Question
-    seen: Imperfections = field(init=False)
+    seen: Imperfections = field(default_factory=Imperfections)
     fitted: OutputFit | None = None
-
-    def __post_init__(self) -> None:
-        self.seen = Imperfections()
 
     def let(self, suspect: _Suspect | None) -> None:
         """Keep the question without the suspect samples, if there are any, if clearly likelier."""
@@ -157,26 +154,38 @@ class _Trial:
         gain = self._gain(suspect.question, self.fitted, again)
         if gain > searched(self.question.output.values.size):
             self.question, self.fitted = _with(suspect.question, suspect.finding), again
-        elif abs(gain) < CLEARLY and suspect.otherwise is not None:
+        elif suspect.otherwise is not None and abs(gain) < CLEARLY and _is_white(again):
             self.question = _with(self.question, suspect.otherwise)
 
     def _gain(self, mended: Question, before: OutputFit, after: OutputFit) -> float:
-        """Log-likelihood that the samples gain which count in the mended record."""
+        """Log-likelihood that the samples gain which count in the mended record.
+
+        The other samples respond to what is lost; with it filled in, they must not fit worse.
+        """
         related = [fit for fit in after.fits if fit.related]
         if not related:
             return -np.inf
-        fits = [fit for fit in (*before.fits, *related) if fit.related]
-        counts = np.ones(mended.output.values.size, dtype=bool)
-        counts[: max(fit.forgotten for fit in fits)] = False
-        for mask in (*(fit.problem.valid for fit in related), counted_in(mended, self.seen)):
-            if mask is not None:
-                counts &= mask
-        y = self.question.output.values
-        rest, left = (np.var((y - fitted.prediction)[counts]) for fitted in (before, after))
-        if not counts.any() or left == 0.0 or rest == 0.0:
+        known = counted_in(mended, self.seen)
+        every = np.ones(mended.output.values.size, dtype=bool) if known is None else known.copy()
+        every[: max(fit.forgotten for fit in (*before.fits, *related) if fit.related)] = False
+        masks = [fit.problem.valid for fit in related if fit.problem.valid is not None]
+        counts = np.logical_and.reduce([every, *masks])
+        if not counts.any() or self._power(after, every) > TWICE * self._power(before, every):
+            return -np.inf
+        rest, left = self._power(before, counts), self._power(after, counts)
+        if left == 0.0 or rest == 0.0:
             return -np.inf
         share = min(fit.effective_share for fit in related)
         return 0.5 * share * np.count_nonzero(counts) * float(np.log(rest / left))
+
+    def _power(self, fitted: OutputFit, counts: Mask) -> float:
+        """Mean square of the residual."""
+        return float(np.var((self.question.output.values - fitted.prediction)[counts]))
+
+
+def _is_white(fitted: OutputFit) -> bool:
+    """Whether the fits leave nothing that richer dynamics would explain."""
+    return all(fit.best.fit.is_white for fit in fitted.fits if fit.related)
 
 
 def _with(question: Question, finding: Finding) -> Question:
@@ -271,14 +280,11 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
         f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output shows that "
         "it moves between these samples: it is interpolated.",
     )
-    otherwise = Finding(
-        code="input_slow",
-        message=f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
+    otherwise = _finding(
+        "input_slow",
+        f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
         f"it moved smoothly and is only recorded so slowly, the delay is {0.5 / slow:.3g} s "
-        "longer. This record does not distinguish the two: state which with intersample=, or "
-        "record the input faster.",
-        severity="doubt",
-        parameters=("delay", "delay_correlation", "delay_low_frequency", "bandwidth_phase90"),
+        "longer. This record does not distinguish the two: record the input faster to be sure.",
     )
     known = np.zeros(source.valid.size, dtype=bool)
     known[at] = True
