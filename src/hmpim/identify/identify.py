@@ -14,7 +14,6 @@ from hmpim.identify.kept import keeping
 from hmpim.identify.nonlinearities import fit_output, model_nonlinearity
 from hmpim.identify.pair import Described, describe, describe_dead
 from hmpim.identify.preparation.clocks import settled_between
-from hmpim.identify.preparation.lost import leave_out_lost
 from hmpim.identify.preparation.question import Question, recognise_software
 from hmpim.identify.preparation.reference import aligned_with_reference
 from hmpim.identify.preparation.refusals import (
@@ -24,6 +23,7 @@ from hmpim.identify.preparation.refusals import (
     checked_intersample,
     checked_structures,
 )
+from hmpim.identify.recorder import leave_out_lost
 from hmpim.identify.result import Identification, RecordSummary
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics

@@ -10,6 +10,7 @@ record without these samples, and the likelier of the two is kept.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from hmpim.identify.arrays import Mask, Real
@@ -20,9 +21,10 @@ from hmpim.identify.effects.lost_samples import find_repeated, find_spikes
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import TWICE
+from hmpim.identify.result.groups import TIMING
+from hmpim.identify.worth import MOST, PART, TWICE
 from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
-from hmpim.record.resample import share_above
+from hmpim.record.resample import CROSSINGS, share_above
 from hmpim.record.runs import runs_of
 from hmpim.record.slower import updates
 
@@ -50,6 +52,7 @@ class _Suspect:
 
     question: Question
     finding: Finding
+    long: bool = False  # whether the samples are too many in a row to be filled in
     otherwise: Finding | None = None  # if the record does not decide
 
 
@@ -151,17 +154,19 @@ class _Trial:
             self.seen = replace(self.seen, spikes=spikes)
             self.fitted = _fitted(self.question, self.seen)
             again = _fitted(suspect.question, self.seen)
-        gain = self._gain(suspect.question, self.fitted, again)
+        gain = self._gain(suspect, self.fitted, again)
         if gain > searched(self.question.output.values.size):
             self.question, self.fitted = _with(suspect.question, suspect.finding), again
         elif suspect.otherwise is not None and abs(gain) < CLEARLY and _is_white(again):
             self.question = _with(self.question, suspect.otherwise)
 
-    def _gain(self, mended: Question, before: OutputFit, after: OutputFit) -> float:
+    def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
         """Log-likelihood that the samples gain which count in the mended record.
 
-        The other samples respond to what is lost; with it filled in, they must not fit worse.
+        The other samples respond to what is lost. With it filled in they must not fit worse; if it
+        is too long to be filled in, they must be less than half.
         """
+        mended = suspect.question
         related = [fit for fit in after.fits if fit.related]
         if not related:
             return -np.inf
@@ -170,7 +175,10 @@ class _Trial:
         every[: max(fit.forgotten for fit in (*before.fits, *related) if fit.related)] = False
         masks = [fit.problem.valid for fit in related if fit.problem.valid is not None]
         counts = np.logical_and.reduce([every, *masks])
-        if not counts.any() or self._power(after, every) > TWICE * self._power(before, every):
+        if not counts.any() or np.count_nonzero(counts) < MOST * np.count_nonzero(every):
+            return -np.inf
+        worse = self._power(after, every) > TWICE * self._power(before, every)
+        if worse and not suspect.long:
             return -np.inf
         rest, left = self._power(before, counts), self._power(after, counts)
         if left == 0.0 or rest == 0.0:
@@ -212,11 +220,13 @@ def _words(question: Question) -> _Suspect | None:
     if found is None:
         return None
     value = output.values[np.argmax(found)]
-    finding = _finding(
-        "fixed_word",
-        f"The output {output.name!r} stays far from the values around over {_samples(found)}, the "
-        f"first at {value:.6g}; they are left out. Look for a word that means 'no value', or for "
-        "loose contacts.",
+    finding = Finding(
+        code="fixed_word",
+        message=f"The output {output.name!r} stays far from the values around over "
+        f"{_samples(found)}, the first at {value:.6g}; they are left out. Look for a word that "
+        "means 'no value', or for loose contacts.",
+        severity="info",
+        parameters=(),
     )
     left = replace(output, valid=output.valid & ~found)
     return _Suspect(question=replace(question, output=left), finding=finding)
@@ -228,11 +238,13 @@ def _pulses(question: Question, i: int) -> _Suspect | None:
     found = find_pulses(source.values, source.valid)
     if found is None:
         return None
-    finding = _finding(
-        "input_spikes",
-        f"The input {source.name!r} moves far out and back within {_samples(found)}, the first "
-        f"{aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but the "
-        "output does not respond: they count as lost. Look for lost bits or loose contacts.",
+    finding = Finding(
+        code="input_spikes",
+        message=f"The input {source.name!r} moves far out and back within {_samples(found)}, the "
+        f"first {aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but "
+        "the output does not respond: they count as lost. Look for lost bits or loose contacts.",
+        severity="info",
+        parameters=(),
     )
     return _Suspect(question=_without(question, i, found), finding=finding)
 
@@ -243,11 +255,13 @@ def _repeats(question: Question, i: int) -> _Suspect | None:
     found = find_repeated(source.values)
     if found is None:
         return None
-    finding = _finding(
-        "input_repeated",
-        f"The input {source.name!r} repeats the sample before to the last digit at "
+    finding = Finding(
+        code="input_repeated",
+        message=f"The input {source.name!r} repeats the sample before to the last digit at "
         f"{_samples(found)}, but the output shows that it moved: they count as lost. Look for "
         "lost frames.",
+        severity="info",
+        parameters=(),
     )
     return _Suspect(question=_without(question, i, found), finding=finding)
 
@@ -258,12 +272,14 @@ def _standstills(question: Question, i: int) -> _Suspect | None:
     found = find_standstills(source.values)
     if found is None:
         return None
-    finding = _finding(
-        "input_frozen",
-        f"The input {source.name!r} stands still over {_samples(found)}, but the output shows that "
-        "it moved: they count as lost. Look for lost updates.",
+    finding = Finding(
+        code="input_frozen",
+        message=f"The input {source.name!r} stands still over {_samples(found)}, but the output "
+        "shows that it moved: they count as lost. Look for lost updates.",
+        severity="info",
+        parameters=(),
     )
-    return _Suspect(question=_without(question, i, found), finding=finding)
+    return _Suspect(question=_without(question, i, found), finding=finding, long=True)
 
 
 def _slow_log(question: Question, i: int) -> _Suspect | None:
@@ -275,33 +291,52 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
     slow = fs * (at.size - 1) / float(at[-1] - at[0])
     if share_above(source.values[at], fs=slow, limit=_SMOOTH * slow) > _FOLDED:
         return None
-    finding = _finding(
-        "input_slow",
-        f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output shows that "
-        "it moves between these samples: it is interpolated.",
+    finding = Finding(
+        code="input_slow",
+        message=f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output "
+        "shows that it moves between these samples: it is interpolated.",
+        severity="info",
+        parameters=(),
     )
-    otherwise = _finding(
-        "input_slow",
-        f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
+    otherwise = Finding(
+        code="input_slow",
+        message=f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
         f"it moved smoothly and is only recorded so slowly, the delay is {0.5 / slow:.3g} s "
-        "longer. This record does not distinguish the two: record the input faster to be sure.",
+        "longer. This record does not distinguish the two: record the input faster, or state "
+        "intersample='zoh' (--intersample zoh) if the unit receives the held values.",
+        severity="doubt",
+        parameters=TIMING,
     )
     known = np.zeros(source.valid.size, dtype=bool)
     known[at] = True
-    read = replace(_filled(question, source, known), valid=source.valid)
+    values = _filled(question, source, known).values.copy()
+    values[at[-1] :] = source.values[at[-1]]
+    read = replace(source, values=values)
     inputs = (*question.aligned.inputs[:i], read, *question.aligned.inputs[i + 1 :])
     aligned = replace(question.aligned, inputs=inputs)
-    smooth = replace(question, aligned=aligned, intersample="bandlimited")
+    output = replace(
+        question.output, valid=question.output.valid & _follows_readings(source.values, at, slow)
+    )
+    smooth = replace(question, aligned=aligned, output=output, intersample="bandlimited")
     return _Suspect(question=smooth, finding=finding, otherwise=otherwise)
+
+
+def _follows_readings(u: Real, at: NDArray[np.intp], slow: float) -> Mask:
+    """Samples, (n,), that do not respond to fast readings near the ends of the record.
+
+    There is no band-limited interpolation near the ends, and a spline errs at a fifth of the rate.
+    """
+    follows = np.ones(u.size, dtype=bool)
+    if at.size > 2 * CROSSINGS:
+        first, last = at[:CROSSINGS], at[-CROSSINGS:]
+        follows[: first[-1]] = share_above(u[first], fs=slow, limit=PART * slow) < _FOLDED
+        follows[last[0] :] = share_above(u[last], fs=slow, limit=PART * slow) < _FOLDED
+    return follows
 
 
 def _samples(found: Mask) -> str:
     count = int(np.count_nonzero(found))
     return f"{count} sample{'s' if count > 1 else ''} ({100 * count / found.size:.2g} %)"
-
-
-def _finding(code: str, message: str) -> Finding:
-    return Finding(code=code, message=message, severity="info", parameters=())
 
 
 def _without(question: Question, i: int, lost: Mask) -> Question:
