@@ -125,9 +125,11 @@ def find_standstills(x: Real) -> Mask | None:
     """
     stands = np.concatenate([[False], np.diff(x) == 0.0])
     found = np.zeros(x.size, dtype=bool)
-    for a, b in zip(*runs_of(stands), strict=True):
+    first, last = runs_of(stands)
+    long = last - first + 1 >= _FEWEST_EQUAL
+    for a, b in zip(first[long], last[long], strict=True):
         around = np.concatenate([stands[max(a - _AROUND, 0) : a], stands[b : b + _AROUND]])
-        if b - a + 1 >= _FEWEST_EQUAL and around.size == 2 * _AROUND and not around[1:].any():
+        if around.size == 2 * _AROUND and not around.any():
             found[a:b] = True
     return found if found.any() else None
 
