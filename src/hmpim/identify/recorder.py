@@ -22,7 +22,7 @@ from hmpim.identify.fits import counted_in, fit_once, imperfections_of
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.result.groups import TIMING
-from hmpim.identify.worth import MOST, PART, TWICE
+from hmpim.identify.worth import FEW, MOST, PART, TWICE
 from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
 from hmpim.record.resample import CROSSINGS, share_above
 from hmpim.record.runs import runs_of
@@ -66,7 +66,7 @@ def leave_out_lost(question: Question) -> Question:
     trial = _Trial(question)
     trial.let(_words(question))
     for i in range(len(question.aligned.inputs)):
-        for kind in (_pulses, _repeats, _standstills, _slow_log):
+        for kind in (_pulses, _input_words, _repeats, _standstills, _slow_log):
             trial.let(kind(trial.question, i))
     return trial.question
 
@@ -75,8 +75,7 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     """Return samples, (n,), at which a signal moves out and back as fast as nowhere nearby.
 
     Both steps must be twice the largest of 25 steps before and after. A pulse has up to three
-    samples, or any number that are equal; with `equal`, it has more than three. None if there are
-    no pulses.
+    samples; with `equal`, more than three that are equal. None if there are no pulses.
 
     Examples
     --------
@@ -88,13 +87,13 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     [100, 300, 301]
     """
     size, moves = x.size, np.diff(x)
-    first, last = runs_of(np.concatenate([[False], moves == 0.0]))
-    long = last - first >= _LONGEST
-    begins, ends = [first[long] - 1], [last[long]]
-    for length in () if equal else range(1, _LONGEST + 1):
-        begins.append(np.arange(1, size - length))
-        ends.append(np.arange(1, size - length) + length)
-    begin, end = np.concatenate(begins), np.concatenate(ends)
+    if equal:
+        first, last = runs_of(np.concatenate([[False], moves == 0.0]))
+        long = last - first >= _LONGEST
+        begin, end = first[long] - 1, last[long]
+    else:
+        begin = np.tile(np.arange(1, size - 1), _LONGEST)
+        end = begin + np.repeat(np.arange(1, _LONGEST + 1), size - 2)
     inside = (begin > 0) & (end < size)
     begin, end = begin[inside], end[inside]
     # Of the _AROUND steps that end with step k, at place k + _AROUND.
@@ -219,7 +218,7 @@ def _words(question: Question) -> _Suspect | None:
     """The output without words that repeat, far from the values around them."""
     output = question.output
     found = find_pulses(output.values, output.valid, equal=True)
-    if found is None:
+    if found is None or np.mean(found) > FEW:
         return None
     value = output.values[np.argmax(found)]
     finding = Finding(
@@ -234,11 +233,16 @@ def _words(question: Question) -> _Suspect | None:
     return _Suspect(question=replace(question, output=left), finding=finding)
 
 
-def _pulses(question: Question, i: int) -> _Suspect | None:
+def _input_words(question: Question, i: int) -> _Suspect | None:
+    """An input without words that repeat, far from the values around them."""
+    return _pulses(question, i, equal=True)
+
+
+def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
     """An input without short pulses."""
     source, aligned = question.aligned.inputs[i], question.aligned
-    found = find_pulses(source.values, source.valid)
-    if found is None:
+    found = find_pulses(source.values, source.valid, equal=equal)
+    if found is None or np.mean(found) > FEW:  # more are motion, as the pulses of a doublet
         return None
     finding = Finding(
         code="input_spikes",
