@@ -303,6 +303,18 @@ NOISE = (
     family("quantised", "Rounded", SECOND, SWEEP, c.quantised),
     family("clipped", "5 to 30 % beyond one end", SECOND, SWEEP, c.clipped(both=False)),
     family("clipped twice", "5 to 30 % beyond each end", SECOND, SWEEP, c.clipped(both=True)),
+    family("wrapped angle", "From 0 to 360, around zero", SECOND, SWEEP, c.wrapped),
+    family("glitch on the input", "One sample of its record", SECOND, SWEEP, c.input_glitch),
+    family("repeated input", "3 % repeat the sample before", SECOND, SWEEP, c.input_repeated),
+    family("frozen input", "Its record stands still for a while", SECOND, SWEEP, c.input_frozen),
+    family("fixed words", "-9999 or 32767 for no value", SECOND, SWEEP, c.fixed_words),
+    family(
+        "slow recorder",
+        "Of the input, which moves between its readings",
+        SECOND,
+        k.sweep(high=0.2),
+        c.slow_recorder,
+    ),
     other("unrelated", "Noise beside a sweep: not identifiable", m.unrelated),
 )
 

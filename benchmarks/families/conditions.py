@@ -217,6 +217,61 @@ def clipped(*, both: bool) -> Condition:
     return spoil
 
 
+def wrapped(take: Take) -> None:
+    """An angle in degrees around zero, recorded from 0 to 360."""
+    rng = take.rng
+    shift = float(rng.uniform(-0.5, 0.5)) * take.motion - take.system.bias
+    take.y = np.mod(take.y + shift, 360.0)
+    take.clean = take.clean + shift
+    take.system = take.system.moved(_with_bias(take, shift))
+
+
+def input_glitch(take: Take) -> None:
+    """One sample of the input is 3 to 100 times its motion off in the record."""
+    rng = take.rng
+    place = int(rng.uniform(0.1, 0.9) * take.u.size)
+    size = float(rng.choice([-1, 1])) * float(rng.uniform(3, 100))
+    take.u = take.u.copy()
+    take.u[place] += size * float(np.std(take.u))
+
+
+def input_repeated(take: Take) -> None:
+    """One input sample in thirty is a copy of the one before."""
+    lost = take.rng.uniform(size=take.u.size) < 0.03
+    lost[0] = False
+    take.u = take.u.copy()
+    for k in np.flatnonzero(lost):
+        take.u[k] = take.u[k - 1]
+    take.lose(lost)
+
+
+def input_frozen(take: Take) -> None:
+    """The record of the input stands still over 2 to 10 % of its length."""
+    n = take.u.size
+    first, long = int(take.rng.uniform(0.2, 0.8) * n), int(take.rng.uniform(0.02, 0.1) * n)
+    lost = (np.arange(n) > first) & (np.arange(n) < first + long)
+    take.u = np.where(lost, take.u[first], take.u)
+    take.lose(lost)
+
+
+def fixed_words(take: Take) -> None:
+    """Three stretches of 4 to 20 output samples hold a word for no value."""
+    rng, n = take.rng, take.y.size
+    lost = np.zeros(n, bool)
+    for first in rng.uniform(0.1, 0.9, 3) * n:
+        lost[int(first) : int(first) + int(rng.integers(4, 21))] = True
+    take.y = np.where(lost, float(rng.choice([-9999.0, 32767.0])), take.y)
+    take.lose(lost)
+
+
+def slow_recorder(take: Take) -> None:
+    """The input is recorded at every second to fourth sample, and moves smoothly between."""
+    most = int(0.4 * take.drive.fs / take.drive.band[1])
+    every = int(take.rng.integers(2, max(min(most, 4), 2) + 1))
+    take.u = take.u[np.arange(take.u.size) // every * every]
+    take.absent.add("noise_std")
+
+
 def stated(take: Take) -> None:
     """The record says what its input does between the samples."""
     words = {"smooth": "bandlimited", "zoh": "zoh", "foh": "foh"}

@@ -242,19 +242,23 @@ def sweep(
     rates: tuple[float, ...] = RATES,
     extinction: tuple[float, ...] = (0.0, 0.5, 1.0),
     samples: int | None = None,
+    high: float = 0.35,
 ) -> MakeDrive:
-    """The paper's sweep as printed, or the plain chirp (n = 0), in closed form."""
+    """The paper's sweep as printed, or the plain chirp (n = 0), in closed form.
+
+    It ends at 0.05 to `high` of the rate.
+    """
 
     def make(rng: Rng) -> Drive:
         fs = float(rng.choice(rates))
         count = samples or length(rng)
         seconds = count / fs
-        low, high = 1 / seconds, fs * float(rng.uniform(0.05, 0.35))
+        low, top = 1 / seconds, fs * float(rng.uniform(0.05, high))
         n, amplitude = float(rng.choice(extinction)), log_uniform(rng, 0.5, 20.0)
         return Drive(
-            source=_swept(low, high, seconds, n, amplitude),
+            source=_swept(low, top, seconds, n, amplitude),
             between=between,
-            band=(low, high),
+            band=(low, top),
             fs=fs,
             samples=count,
         )

@@ -23,6 +23,7 @@ from hmpim.identify.preparation.refusals import (
     checked_intersample,
     checked_structures,
 )
+from hmpim.identify.recorder import leave_out_lost
 from hmpim.identify.result import Identification, RecordSummary
 from hmpim.identify.statistics.describe import identify_statistics
 from hmpim.identify.statistics.statistics import Statistics
@@ -166,6 +167,7 @@ def identify_output(question: Question) -> Described:
     """Identify one output against every input, jointly if there are several."""
     if not question.moves:
         return describe_dead(question)
+    question = leave_out_lost(question)
     question = recognise_software(mark_swapped(question))
     seen = look(question)
     seen, fitted = fit_output(question, seen)

@@ -17,6 +17,7 @@ from hmpim.record.onto import FASTER, is_reduced, on_grid
 from hmpim.record.quality import clock_findings
 from hmpim.record.record import Record
 from hmpim.record.resample import share_above
+from hmpim.record.turns import continue_turns
 
 __all__ = ["Aligned", "Signal", "uniform"]
 
@@ -61,8 +62,8 @@ class Aligned:
     inputs, outputs : tuple of Signal
         The channels, in the record's order.
     findings : tuple of Finding
-        What was found when the record was read, then what had to be repaired here: 'gaps',
-        'jitter', 'even_samples', 'rate', 'resampled'. Empty if nothing.
+        What was found when the record was read, then what had to be repaired here: 'wrapped',
+        'gaps', 'jitter', 'even_samples', 'rate', 'resampled'. Empty if nothing.
     intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
         What the inputs do between the samples here: as the record states, but 'bandlimited'
         where a held or linear one has its corners by a clock of its own.
@@ -109,6 +110,8 @@ def uniform(record: Record) -> Aligned:
     A record that is uniform already comes back with its own arrays, bit for bit; stamps that
     are merely rounded when printed are uniform. What else is done:
 
+    * Angles and counters that start again after a whole turn: turns are added, so that they
+      continue (see `hmpim.record.turns`).
     * Gaps: the clock runs on through them. Samples beside a gap stay as they are; inside it
       values are filled in and marked in `Signal.valid`.
     * Jitter of stamps whose samples were taken evenly: the samples are kept as they are
@@ -154,13 +157,16 @@ def uniform(record: Record) -> Aligned:
     >>> aligned.inputs[0].values.round(9).tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     """
+    continued = continue_turns(record)
+    record = continued.record
     channels = (*record.outputs, *record.inputs)
     clocks = _clocks(channels, record.fs)
     first = channels[0]
     clock = clocks[id(first.time)]
     shared = all(clocks[id(c.time)] is clock for c in channels)
     even = evenly_sampled(channels, clock, nominal=record.fs) if shared else None
-    findings = [*record.findings, *clock_findings(clock, first.time, stated=record.fs, even=even)]
+    timing = clock_findings(clock, first.time, stated=record.fs, even=even)
+    findings = [*record.findings, *continued.findings, *timing]
     if even is not None:
         clock, record = even, _stamped_evenly(record, even)
         channels = (*record.outputs, *record.inputs)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["restored"]
+__all__ = ["restored", "updates"]
 
 _FEWEST = 20
 """Changes from which on all but one are an even number of samples apart by chance in fewer than one
@@ -48,6 +48,19 @@ def restored(
     np.maximum.at(highest, kept[known], values[known])
     told = ~known & (lowest == highest)[kept]
     return np.where(told, lowest[kept], values), told
+
+
+def updates(values: NDArray[np.float64]) -> NDArray[np.intp] | None:
+    """Samples at which a slower clock updates a channel, (m,); None if there is no such clock.
+
+    Examples
+    --------
+    >>> x = np.repeat(np.random.default_rng(0).standard_normal(30), 4)
+    >>> updates(x)[:3].tolist()
+    [0, 4, 8]
+    """
+    period, first = _clock(np.flatnonzero(np.diff(values) != 0.0) + 1)
+    return None if period == 1 else np.arange(first, values.size, period)
 
 
 def _clock(moved: NDArray[np.intp]) -> tuple[int, int]:

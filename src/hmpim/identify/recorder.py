@@ -1,0 +1,364 @@
+"""Samples that the recorder lost or changed, and the unit never responded to.
+
+A recorder may lose a word, repeat the last one, stand still, or write a fixed word for "no value".
+In an input, such samples look like motion, to which a response is missing everywhere in the model.
+But an input may also contain a pulse, as an impact test does, or stand still on purpose, as a
+trapezoid does. The output tells which: plain dynamics are fitted to the record as it is and to the
+record without these samples, and the likelier of the two is kept.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import CLEARLY, searched
+from hmpim.identify.coupling.output_fit import OutputFit
+from hmpim.identify.effects.imperfections import Imperfections
+from hmpim.identify.effects.lost_samples import find_repeated, find_spikes
+from hmpim.identify.fits import counted_in, fit_once, imperfections_of
+from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
+from hmpim.identify.preparation.question import Question
+from hmpim.identify.result.groups import TIMING
+from hmpim.identify.worth import FEW, MOST, PART, TWICE
+from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
+from hmpim.record.resample import CROSSINGS, share_above
+from hmpim.record.runs import runs_of
+from hmpim.record.slower import updates
+
+__all__ = ["find_pulses", "find_standstills", "leave_out_lost"]
+
+_LONGEST = 3
+"""Most samples of a pulse whose values differ, as of a spike of the output."""
+
+_AROUND = 25
+"""Samples on either side with which a pulse is compared."""
+
+_FEWEST_EQUAL = 8
+"""Equal samples in a row from which an input may stand still."""
+
+_SMOOTH = 0.4
+"""Frequency, over the rate of a slow recorder, below which it reads a smooth input faithfully."""
+
+_FOLDED = 0.001
+"""Share of the power above it, 3 % of the amplitude, from which the input is not smooth."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Suspect:
+    """A question without the samples of one kind that may be lost."""
+
+    question: Question
+    finding: Finding
+    long: bool = False  # whether the samples are too many in a row to be filled in
+    otherwise: Finding | None = None  # if the record does not decide
+
+
+def leave_out_lost(question: Question) -> Question:
+    """Take samples for lost if plain dynamics without them are clearly likelier.
+
+    Not in loops, where the noise moves the input, and not for stated software.
+    """
+    if question.instrument is not None or question.intersample == "sampled":
+        return question
+    trial = _Trial(question)
+    trial.let(_words(question))
+    for i in range(len(question.aligned.inputs)):
+        for kind in (_pulses, _input_words, _repeats, _standstills, _slow_log):
+            trial.let(kind(trial.question, i))
+    return trial.question
+
+
+def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
+    """Return samples, (n,), at which a signal moves out and back as fast as nowhere nearby.
+
+    Both steps must be twice the largest of 25 steps before and after. A pulse has up to three
+    samples; with `equal`, more than three that are equal. None if there are no pulses.
+
+    Examples
+    --------
+    >>> x = np.sin(np.arange(500) ** 2 / 5000)
+    >>> find_pulses(x, np.ones(500, dtype=bool)) is None
+    True
+    >>> x[[100, 300, 301]] += 5.0
+    >>> np.flatnonzero(find_pulses(x, np.ones(500, dtype=bool))).tolist()
+    [100, 300, 301]
+    """
+    size, moves = x.size, np.diff(x)
+    if equal:
+        first, last = runs_of(np.concatenate([[False], moves == 0.0]))
+        long = last - first >= _LONGEST
+        begin, end = first[long] - 1, last[long]
+    else:
+        begin = np.tile(np.arange(1, size - 1), _LONGEST)
+        end = begin + np.repeat(np.arange(1, _LONGEST + 1), size - 2)
+    inside = (begin > 0) & (end < size)
+    begin, end = begin[inside], end[inside]
+    # Of the _AROUND steps that end with step k, at place k + _AROUND.
+    largest = maximum_filter1d(np.pad(np.abs(moves), _AROUND), _AROUND, origin=_AROUND // 2)
+    usual = np.maximum(largest[begin + _AROUND - 2], largest[end + 2 * _AROUND - 1])
+    out, back = moves[begin - 1], -moves[end - 1]
+    fast = np.minimum(np.abs(out), np.abs(back)) > TWICE * usual
+    found = np.zeros(size, dtype=bool)
+    for a, b in zip(begin[fast & (out * back > 0.0)], end[fast & (out * back > 0.0)], strict=True):
+        if valid[a - 1 : b + 1].all():
+            found[a:b] = True
+    return found if found.any() else None
+
+
+def find_standstills(x: Real) -> Mask | None:
+    """Return samples, (n,), at which a signal stands still that moves before and after, or None.
+
+    The first sample of a standstill is not among them.
+
+    Examples
+    --------
+    >>> x = np.sin(np.arange(500) / 20)
+    >>> find_standstills(x) is None
+    True
+    >>> x[200:220] = x[200]
+    >>> np.flatnonzero(find_standstills(x))[[0, -1]].tolist()
+    [201, 219]
+    """
+    stands = np.concatenate([[False], np.diff(x) == 0.0])
+    found = np.zeros(x.size, dtype=bool)
+    first, last = runs_of(stands)
+    long = last - first + 1 >= _FEWEST_EQUAL
+    for a, b in zip(first[long], last[long], strict=True):
+        around = np.concatenate([stands[max(a - _AROUND, 0) : a], stands[b : b + _AROUND]])
+        if around.size == 2 * _AROUND and not around.any():
+            found[a:b] = True
+    return found if found.any() else None
+
+
+@dataclass(slots=True)
+class _Trial:
+    """The question, and the plain fits to it once they are needed."""
+
+    question: Question
+    seen: Imperfections = field(default_factory=Imperfections)
+    fitted: OutputFit | None = None
+
+    def let(self, suspect: _Suspect | None) -> None:
+        """Keep the question without the suspect samples, if there are any, if clearly likelier."""
+        if suspect is None or not _moves(suspect.question):
+            return
+        if self.fitted is None:
+            inputs = [source.values for source in self.question.aligned.inputs]
+            self.seen = imperfections_of(self.question, inputs=inputs)
+            self.fitted = _fitted(self.question, self.seen)
+        again = _fitted(suspect.question, self.seen)
+        spikes = find_spikes(self.question.output.values, again.prediction)
+        if spikes is not None and self.seen.spikes is None:
+            self.seen = replace(self.seen, spikes=spikes)
+            self.fitted = _fitted(self.question, self.seen)
+            again = _fitted(suspect.question, self.seen)
+        gain = self._gain(suspect, self.fitted, again)
+        if gain > searched(self.question.output.values.size):
+            self.question, self.fitted = _with(suspect.question, suspect.finding), again
+        elif suspect.otherwise is not None and abs(gain) < CLEARLY and _is_white(again):
+            self.question = _with(self.question, suspect.otherwise)
+
+    def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
+        """Log-likelihood that the samples gain which count in the mended record.
+
+        The other samples respond to what is lost. With it filled in they must not fit worse; if it
+        is too long to be filled in, they must be less than half.
+        """
+        mended = suspect.question
+        related = [fit for fit in after.fits if fit.related]
+        if not related:
+            return -np.inf
+        known = counted_in(mended, self.seen)
+        every = np.ones(mended.output.values.size, dtype=bool) if known is None else known.copy()
+        every[: max(fit.forgotten for fit in (*before.fits, *related) if fit.related)] = False
+        masks = [fit.problem.valid for fit in related if fit.problem.valid is not None]
+        counts = np.logical_and.reduce([every, *masks])
+        if not counts.any() or np.count_nonzero(counts) < MOST * np.count_nonzero(every):
+            return -np.inf
+        worse = self._power(after, every) > TWICE * self._power(before, every)
+        if worse and not suspect.long:
+            return -np.inf
+        rest, left = self._power(before, counts), self._power(after, counts)
+        if left == 0.0 or rest == 0.0:
+            return -np.inf
+        share = min(fit.effective_share for fit in related)
+        return 0.5 * share * np.count_nonzero(counts) * float(np.log(rest / left))
+
+    def _power(self, fitted: OutputFit, counts: Mask) -> float:
+        """Mean square of the residual."""
+        return float(np.var((self.question.output.values - fitted.prediction)[counts]))
+
+
+def _is_white(fitted: OutputFit) -> bool:
+    """Whether the fits leave nothing that richer dynamics would explain."""
+    return all(fit.best.fit.is_white for fit in fitted.fits if fit.related)
+
+
+def _with(question: Question, finding: Finding) -> Question:
+    aligned = question.aligned
+    return replace(question, aligned=replace(aligned, findings=(*aligned.findings, finding)))
+
+
+def _moves(question: Question) -> bool:
+    """Whether the output and every input still move."""
+    inputs = question.aligned.inputs
+    return question.moves and all(np.ptp(source.values) > 0.0 for source in inputs)
+
+
+def _fitted(question: Question, seen: Imperfections) -> OutputFit:
+    """Plain dynamics, or an integrator."""
+    names = tuple(name for name in question.structures if name in (*PLAIN, *INTEGRATING))
+    return fit_once(question, seen, names or question.structures)
+
+
+def _words(question: Question) -> _Suspect | None:
+    """The output without words that repeat, far from the values around them."""
+    output = question.output
+    found = find_pulses(output.values, output.valid, equal=True)
+    if found is None or np.mean(found) > FEW:
+        return None
+    value = output.values[np.argmax(found)]
+    finding = Finding(
+        code="fixed_word",
+        message=f"The output {output.name!r} stays far from the values around over "
+        f"{_samples(found)}, the first at {value:.6g}; they are left out. Look for a word that "
+        "means 'no value', or for loose contacts.",
+        severity="info",
+        parameters=(),
+    )
+    left = replace(output, valid=output.valid & ~found)
+    return _Suspect(question=replace(question, output=left), finding=finding)
+
+
+def _input_words(question: Question, i: int) -> _Suspect | None:
+    """An input without words that repeat, far from the values around them."""
+    return _pulses(question, i, equal=True)
+
+
+def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
+    """An input without short pulses."""
+    source, aligned = question.aligned.inputs[i], question.aligned
+    found = find_pulses(source.values, source.valid, equal=equal)
+    if found is None or np.mean(found) > FEW:  # more are motion, as the pulses of a doublet
+        return None
+    finding = Finding(
+        code="input_spikes",
+        message=f"The input {source.name!r} moves far out and back within {_samples(found)}, the "
+        f"first {aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but "
+        "the output does not respond: they count as lost. Look for lost bits or loose contacts.",
+        severity="info",
+        parameters=(),
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _repeats(question: Question, i: int) -> _Suspect | None:
+    """An input without samples that repeat the one before."""
+    source = question.aligned.inputs[i]
+    found = find_repeated(source.values)
+    if found is None:
+        return None
+    finding = Finding(
+        code="input_repeated",
+        message=f"The input {source.name!r} repeats the sample before to the last digit at "
+        f"{_samples(found)}, but the output shows that it moved: they count as lost. Look for "
+        "lost frames.",
+        severity="info",
+        parameters=(),
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding)
+
+
+def _standstills(question: Question, i: int) -> _Suspect | None:
+    """An input without stretches at which it stands still."""
+    source = question.aligned.inputs[i]
+    found = find_standstills(source.values)
+    if found is None:
+        return None
+    finding = Finding(
+        code="input_frozen",
+        message=f"The input {source.name!r} stands still over {_samples(found)}, but the output "
+        "shows that it moved: they count as lost. Look for lost updates.",
+        severity="info",
+        parameters=(),
+    )
+    return _Suspect(question=_without(question, i, found), finding=finding, long=True)
+
+
+def _slow_log(question: Question, i: int) -> _Suspect | None:
+    """A smooth input that the recorder reads by a slower clock, joined between its readings."""
+    source, fs = question.aligned.inputs[i], question.aligned.fs
+    at = updates(source.values)
+    if at is None or question.intersample is not None or not source.valid.all():
+        return None
+    slow = fs * (at.size - 1) / float(at[-1] - at[0])
+    if share_above(source.values[at], fs=slow, limit=_SMOOTH * slow) > _FOLDED:
+        return None
+    finding = Finding(
+        code="input_slow",
+        message=f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output "
+        "shows that it moves between these samples: it is interpolated.",
+        severity="info",
+        parameters=(),
+    )
+    otherwise = Finding(
+        code="input_slow",
+        message=f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
+        f"it moved smoothly and is only recorded so slowly, the delay is {0.5 / slow:.3g} s "
+        "longer. This record does not distinguish the two: record the input faster, or state "
+        "intersample='zoh' (--intersample zoh) if the unit receives the held values.",
+        severity="doubt",
+        parameters=TIMING,
+    )
+    known = np.zeros(source.valid.size, dtype=bool)
+    known[at] = True
+    values = _filled(question, source, known).values.copy()
+    values[at[-1] :] = source.values[at[-1]]
+    read = replace(source, values=values)
+    inputs = (*question.aligned.inputs[:i], read, *question.aligned.inputs[i + 1 :])
+    aligned = replace(question.aligned, inputs=inputs)
+    output = replace(
+        question.output, valid=question.output.valid & _follows_readings(source.values, at, slow)
+    )
+    smooth = replace(question, aligned=aligned, output=output, intersample="bandlimited")
+    return _Suspect(question=smooth, finding=finding, otherwise=otherwise)
+
+
+def _follows_readings(u: Real, at: NDArray[np.intp], slow: float) -> Mask:
+    """Samples, (n,), that do not respond to fast readings near the ends of the record.
+
+    There is no band-limited interpolation near the ends, and a spline errs at a fifth of the rate.
+    """
+    follows = np.ones(u.size, dtype=bool)
+    if at.size > 2 * CROSSINGS:
+        first, last = at[:CROSSINGS], at[-CROSSINGS:]
+        follows[: first[-1]] = share_above(u[first], fs=slow, limit=PART * slow) < _FOLDED
+        follows[last[0] :] = share_above(u[last], fs=slow, limit=PART * slow) < _FOLDED
+    return follows
+
+
+def _samples(found: Mask) -> str:
+    count = int(np.count_nonzero(found))
+    return f"{count} sample{'s' if count > 1 else ''} ({100 * count / found.size:.2g} %)"
+
+
+def _without(question: Question, i: int, lost: Mask) -> Question:
+    """The question with these samples of input `i` filled in."""
+    aligned = question.aligned
+    source = _filled(question, aligned.inputs[i], aligned.inputs[i].valid & ~lost)
+    inputs = (*aligned.inputs[:i], source, *aligned.inputs[i + 1 :])
+    return replace(question, aligned=replace(aligned, inputs=inputs))
+
+
+def _filled(question: Question, source: Signal, known: Mask) -> Signal:
+    """An input of which only these samples are known."""
+    aligned = question.aligned
+    channel = Channel(name=source.name, time=aligned.time[known], values=source.values[known])
+    clock = fit_clock(channel.time, nominal=aligned.fs)
+    values, valid = on_grid(
+        channel, clock, aligned.time, fs=aligned.fs, intersample=question.intersample
+    )
+    return replace(source, values=values, valid=valid)
