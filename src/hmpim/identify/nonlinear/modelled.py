@@ -14,6 +14,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.least_squares import UNSEEN
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
@@ -266,11 +267,14 @@ def described(joint: JointFit, one: NonlinearRow, fs: float) -> tuple[Modelled, 
     residual = weighed.innovations(fit.prediction, fit.residual)
     freedom = max(weighed.counted - len(tools), 1)
     own = covariance(tools, residual, freedom=freedom, white=is_white(residual))
-    scale = np.sqrt(own.diagonal())
-    moved = jacobian(others, fit, *_moved_rows(joint, one, scale))[-len(tools) :]
-    mixed = tools @ (tools + moved).T * np.outer(scale, scale)
-    turn = np.linalg.lstsq(mixed, tools @ tools.T * np.outer(scale, scale), rcond=1e-12)[0]
-    own = turn @ (own / np.outer(scale, scale)) @ turn.T * np.outer(scale, scale)
+    moves = _moved_rows(joint, one, np.sqrt(own.diagonal()))
+    moved = jacobian(others, fit, *moves)[-len(tools) :]
+    sizes = np.sqrt(np.vecdot(tools, tools))
+    rows, moved = tools / sizes[:, None], moved / sizes[:, None]
+    # What the record does not determine keeps its error: there the row's motion is left out.
+    shift = np.linalg.pinv(rows @ rows.T, rcond=UNSEEN, hermitian=True) @ (rows @ moved.T)
+    turn = np.linalg.inv(np.eye(len(rows)) + shift) * sizes / sizes[:, None]
+    own = turn @ own @ turn.T
     size, kind, row = float(fit.nuisance[-1]), one.kind, one.row
     if kind in ("hardening", "softening"):
         kind = "hardening" if size > 0.0 else "softening"
