@@ -162,10 +162,11 @@ class _Trial:
             self.question = _with(self.question, suspect.otherwise)
 
     def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
-        """Log-likelihood that the samples gain which count in the mended record.
+        """Log-likelihood that the record gains without what is lost.
 
-        The other samples respond to what is lost. With it filled in they must not fit worse; if it
-        is too long to be filled in, they must be less than half.
+        Samples that respond to what is lost are less than half. With it filled in they must not fit
+        worse, and only the others count. If it is too long to be filled in, its response has a
+        variance of its own: it is unknown.
         """
         mended = suspect.question
         related = [fit for fit in after.fits if fit.related]
@@ -184,8 +185,13 @@ class _Trial:
         rest, left = self._power(before, counts), self._power(after, counts)
         if left == 0.0 or rest == 0.0:
             return -np.inf
-        share = min(fit.effective_share for fit in related)
-        return 0.5 * share * np.count_nonzero(counts) * float(np.log(rest / left))
+        gain = np.count_nonzero(counts) * float(np.log(rest / left))
+        lost = every & ~counts
+        if suspect.long and lost.any():
+            whole, inside = self._power(before, every), self._power(after, lost)
+            gain = np.count_nonzero(counts) * float(np.log(whole / left))
+            gain += np.count_nonzero(lost) * float(np.log(whole / inside))
+        return 0.5 * min(fit.effective_share for fit in related) * gain
 
     def _power(self, fitted: OutputFit, counts: Mask) -> float:
         """Mean square of the residual."""
