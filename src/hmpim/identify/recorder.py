@@ -156,9 +156,11 @@ class _Trial:
             self.fitted = _fitted(self.question, self.seen)
             again = _fitted(suspect.question, self.seen)
         gain = self._gain(suspect, self.fitted, again)
-        if gain > searched(self.question.output.values.size):
+        # Held or slowly recorded are two hypotheses; lost samples are searched for.
+        searches = suspect.otherwise is None
+        if gain > (searched(self.question.output.values.size) if searches else CLEARLY):
             self.question, self.fitted = _with(suspect.question, suspect.finding), again
-        elif suspect.otherwise is not None and abs(gain) < CLEARLY and _is_white(again):
+        elif suspect.otherwise is not None and gain > -CLEARLY and _is_white(again):
             self.question = _with(self.question, suspect.otherwise)
 
     def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
