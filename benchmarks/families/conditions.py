@@ -218,7 +218,7 @@ def clipped(*, both: bool) -> Condition:
 
 
 def wrapped(take: Take) -> None:
-    """An angle in degrees around zero, recorded from 0 to 360."""
+    """An angle in degrees around zero, recorded between 0 and 360."""
     rng = take.rng
     shift = float(rng.uniform(-0.5, 0.5)) * take.motion - take.system.bias
     take.y = np.mod(take.y + shift, 360.0)
@@ -227,7 +227,7 @@ def wrapped(take: Take) -> None:
 
 
 def input_glitch(take: Take) -> None:
-    """One sample of the input is 3 to 100 times its motion off in the record."""
+    """One recorded sample of the input is off by 3 to 100 times the input's standard deviation."""
     rng = take.rng
     place = int(rng.uniform(0.1, 0.9) * take.u.size)
     size = float(rng.choice([-1, 1])) * float(rng.uniform(3, 100))
@@ -236,7 +236,7 @@ def input_glitch(take: Take) -> None:
 
 
 def input_repeated(take: Take) -> None:
-    """One input sample in thirty is a copy of the one before."""
+    """One input sample in thirty repeats the previous one."""
     lost = take.rng.uniform(size=take.u.size) < 0.03
     lost[0] = False
     take.u = take.u.copy()
@@ -246,7 +246,7 @@ def input_repeated(take: Take) -> None:
 
 
 def input_frozen(take: Take) -> None:
-    """The record of the input stands still over 2 to 10 % of its length."""
+    """The record of the input is frozen over 2 to 10 % of its length."""
     n = take.u.size
     first, long = int(take.rng.uniform(0.2, 0.8) * n), int(take.rng.uniform(0.02, 0.1) * n)
     lost = (np.arange(n) > first) & (np.arange(n) < first + long)
@@ -255,7 +255,7 @@ def input_frozen(take: Take) -> None:
 
 
 def fixed_words(take: Take) -> None:
-    """Three stretches of 4 to 20 output samples hold a word for no value."""
+    """Three stretches of 4 to 20 output samples hold a word that means "no value"."""
     rng, n = take.rng, take.y.size
     lost = np.zeros(n, bool)
     for first in rng.uniform(0.1, 0.9, 3) * n:

@@ -99,7 +99,7 @@ def lead_lag(rng: Rng, drive: Drive) -> System:
 
 
 def slow_tail(rng: Rng, drive: Drive) -> System:
-    """Second order, and a last 1 to 6 % that settles slowly, as in a loop with integral action."""
+    """Second order; the last 1 to 6 % settles slowly, as in a loop with integral action."""
     pair = (share_of(rng, drive, 0.15, 0.5), float(rng.uniform(0.3, 0.9)))
     slow = drive.duration * log_uniform(rng, 0.03, 0.2)
     lead = slow * (1 + float(rng.choice([-1.0, 1.0])) * log_uniform(rng, 0.01, 0.06))

@@ -26,7 +26,7 @@ def test_a_wrapped_motion_is_found_again(turn, unit, amplitude):
     assert aligned.inputs[0].values is record.inputs[0].values
     (finding,) = aligned.findings
     assert finding.code == "wrapped"
-    assert f"nearly {turn:.6g}" in finding.message
+    assert f"about {turn:.6g}" in finding.message
 
 
 @pytest.mark.parametrize(

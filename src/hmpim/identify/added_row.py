@@ -48,22 +48,22 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
     Not for clipped or held outputs, and not together with a changing gain.
     """
     found = [
-        (gain, one, beside, other)
-        for gain, one, beside, other in _with_rows(question, seen, fitted, None)
-        if gain > 2 * CLEARLY and leaves_noise(beside, one, seen.rounding)
+        (gain, row, joint, linear)
+        for gain, row, joint, linear in _with_rows(question, seen, fitted, None)
+        if gain > 2 * CLEARLY and leaves_noise(joint, row, seen.rounding)
     ]
     if not found:
         return fitted
-    most, one, beside, other = max(found, key=itemgetter(0))
+    most, best, chosen, linear = max(found, key=itemgetter(0))
     others = {
-        row.kind: fit.best.fit
-        for gain, row, fit, _ in found
-        if row.kind != one.kind and gain > most - 2 * LIKELIER
+        row.kind: joint.best.fit
+        for gain, row, joint, _ in sorted(found, key=itemgetter(0))  # of a kind, the likeliest
+        if row.kind != best.kind and gain > most - 2 * LIKELIER
     }
-    bending, own = described(beside, one, question.aligned.fs)
+    bending, own = described(chosen, best, question.aligned.fs)
     return replace(
-        other,
-        fits=(without_rows(beside, slice(-1, None)),),
+        linear,
+        fits=(without_rows(chosen, slice(-1, None)),),
         bending=replace(bending, others=others),
         covariances=(own,),
         gaining=None,

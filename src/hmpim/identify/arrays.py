@@ -25,7 +25,7 @@ Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
 _FEW, _MANY = 5, 8
-"""Rows on one side, and on both, from which on BLAS multiplies long rows faster than one by one."""
+"""Fewest rows on either side, and on the larger one, for which BLAS is faster for long rows."""
 
 _BULK = 60_000
 """Samples from which the size of the bulk of a record is known to half a per cent."""
@@ -53,7 +53,7 @@ def median(values: Real) -> float:
 def dots(rows: Real, others: Real) -> Real:
     """Inner products of rows, (k, n), with others, (m, n): shape (k, m).
 
-    Of few long rows a product of matrices takes up to five times as long.
+    For a few long rows, a matrix product takes up to five times as long.
 
     Examples
     --------

@@ -123,7 +123,8 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
         return None
     joint, drifting = found
     best = joint.best.fit  # richer dynamics may explain the slow part
-    if follows(course.data, best) or hidden_tail(joint.problem, best) is not None:
+    tail = hidden_tail(joint.weighed, best, share=joint.weighed_share)
+    if follows(course.data, best) or tail is not None:
         return None
     return OutputFit(fits=(joint,), drifting=drifting)
 

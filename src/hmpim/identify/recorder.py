@@ -1,10 +1,10 @@
-"""Samples that the recorder lost or changed, and the unit never responded to.
+"""Samples that the recorder lost or changed, so that the unit never responded to them.
 
-A recorder may lose a word, repeat the last one, stand still, or write a fixed word for "no value".
-In an input, such samples look like motion, to which a response is missing everywhere in the model.
-But an input may also contain a pulse, as an impact test does, or stand still on purpose, as a
-trapezoid does. The output tells which: plain dynamics are fitted to the record as it is and to the
-record without these samples, and the likelier of the two is kept.
+A recorder may corrupt a sample, repeat the previous one, freeze, or write a fixed word that means
+"no value". In an input, such samples look like motion to which the output does not respond. But
+an input may also contain a real pulse, as in an impact test, or a real standstill, as in a
+trapezoid. The output decides: plain dynamics are fitted to the record as it is and to the record
+without these samples, and the likelier of the two is kept.
 """
 
 from dataclasses import dataclass, field, replace
@@ -31,19 +31,19 @@ from hmpim.record.slower import updates
 __all__ = ["find_pulses", "find_standstills", "leave_out_lost"]
 
 _LONGEST = 3
-"""Most samples of a pulse whose values differ, as of a spike of the output."""
+"""Greatest length of a pulse whose values differ, in samples, as for a spike of the output."""
 
 _AROUND = 25
-"""Samples on either side with which a pulse is compared."""
+"""Samples on either side of a pulse or a standstill that it is compared with."""
 
 _FEWEST_EQUAL = 8
-"""Equal samples in a row from which an input may stand still."""
+"""Fewest successive equal samples that count as a standstill of an input."""
 
 _SMOOTH = 0.4
-"""Frequency, over the rate of a slow recorder, below which it reads a smooth input faithfully."""
+"""Frequency, over the rate of a slow recorder, up to which its samples determine an input."""
 
 _FOLDED = 0.001
-"""Share of the power above it, 3 % of the amplitude, from which the input is not smooth."""
+"""Share of the power above that frequency, 3 % of the amplitude, from which it is not smooth."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,30 +52,31 @@ class _Suspect:
 
     question: Question
     finding: Finding
-    long: bool = False  # whether the samples are too many in a row to be filled in
-    otherwise: Finding | None = None  # if the record does not decide
+    long: bool = False  # whether the stretches are too long to be filled in
+    if_undecided: Finding | None = None  # what is reported if neither question is clearly likelier
 
 
 def leave_out_lost(question: Question) -> Question:
-    """Take samples for lost if plain dynamics without them are clearly likelier.
+    """Treat samples as lost if plain dynamics without them are clearly likelier.
 
-    Not in loops, where the noise moves the input, and not for stated software.
+    Closed loops, in which noise moves the input, and stated software are not examined.
     """
     if question.instrument is not None or question.intersample == "sampled":
         return question
-    trial = _Trial(question)
-    trial.let(_words(question))
+    search = _Search(question)
+    search.examine(_words(question))
     for i in range(len(question.aligned.inputs)):
         for kind in (_pulses, _input_words, _repeats, _standstills, _slow_log):
-            trial.let(kind(trial.question, i))
-    return trial.question
+            search.examine(kind(search.question, i))
+    return search.question
 
 
 def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     """Return samples, (n,), at which a signal moves out and back as fast as nowhere nearby.
 
-    Both steps must be twice the largest of 25 steps before and after. A pulse has up to three
-    samples; with `equal`, more than three that are equal. None if there are no pulses.
+    Both steps must be more than twice the largest of the 25 steps before and the 25 steps after. A
+    pulse has at most three samples; with `equal`, four or more, all equal. None if there is no
+    pulse.
 
     Examples
     --------
@@ -109,9 +110,9 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
 
 
 def find_standstills(x: Real) -> Mask | None:
-    """Return samples, (n,), at which a signal stands still that moves before and after, or None.
+    """Return samples, (n,), at which a signal that moves before and after stands still.
 
-    The first sample of a standstill is not among them.
+    The first sample of a standstill is not included. None if there is no standstill.
 
     Examples
     --------
@@ -134,15 +135,15 @@ def find_standstills(x: Real) -> Mask | None:
 
 
 @dataclass(slots=True)
-class _Trial:
-    """The question, and the plain fits to it once they are needed."""
+class _Search:
+    """The question so far, and plain fits to it, which are made when first needed."""
 
     question: Question
     seen: Imperfections = field(default_factory=Imperfections)
     fitted: OutputFit | None = None
 
-    def let(self, suspect: _Suspect | None) -> None:
-        """Keep the question without the suspect samples, if there are any, if clearly likelier."""
+    def examine(self, suspect: _Suspect | None) -> None:
+        """Leave the suspect samples out if the record is then clearly likelier."""
         if suspect is None or not _moves(suspect.question):
             return
         if self.fitted is None:
@@ -157,18 +158,18 @@ class _Trial:
             again = _fitted(suspect.question, self.seen)
         gain = self._gain(suspect, self.fitted, again)
         # Held or slowly recorded are two hypotheses; lost samples are searched for.
-        searches = suspect.otherwise is None
+        searches = suspect.if_undecided is None
         if gain > (searched(self.question.output.values.size) if searches else CLEARLY):
             self.question, self.fitted = _with(suspect.question, suspect.finding), again
-        elif suspect.otherwise is not None and gain > -CLEARLY and _is_white(again):
-            self.question = _with(self.question, suspect.otherwise)
+        elif suspect.if_undecided is not None and gain > -CLEARLY and _is_white(again):
+            self.question = _with(self.question, suspect.if_undecided)
 
     def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
-        """Log-likelihood that the record gains without what is lost.
+        """Gain in log-likelihood by leaving out what is lost.
 
-        Samples that respond to what is lost are less than half. With it filled in they must not fit
-        worse, and only the others count. If it is too long to be filled in, its response has a
-        variance of its own: it is unknown.
+        At least half of all samples must count; the others may respond to lost ones. If these can
+        be filled in, the residual at all samples must not have more than twice its former power. A
+        long loss cannot be filled in, so the samples that respond to it have their own variance.
         """
         mended = suspect.question
         related = [fit for fit in after.fits if fit.related]
@@ -184,14 +185,14 @@ class _Trial:
         worse = self._power(after, every) > TWICE * self._power(before, every)
         if worse and not suspect.long:
             return -np.inf
-        rest, left = self._power(before, counts), self._power(after, counts)
-        if left == 0.0 or rest == 0.0:
+        earlier, later = self._power(before, counts), self._power(after, counts)
+        if later == 0.0 or earlier == 0.0:
             return -np.inf
-        gain = np.count_nonzero(counts) * float(np.log(rest / left))
+        gain = np.count_nonzero(counts) * float(np.log(earlier / later))
         lost = every & ~counts
         if suspect.long and lost.any():
             whole, inside = self._power(before, every), self._power(after, lost)
-            gain = np.count_nonzero(counts) * float(np.log(whole / left))
+            gain = np.count_nonzero(counts) * float(np.log(whole / later))
             gain += np.count_nonzero(lost) * float(np.log(whole / inside))
         return 0.5 * min(fit.effective_share for fit in related) * gain
 
@@ -201,7 +202,7 @@ class _Trial:
 
 
 def _is_white(fitted: OutputFit) -> bool:
-    """Whether the fits leave nothing that richer dynamics would explain."""
+    """Whether the fits leave white noise, so that richer dynamics need not be tried."""
     return all(fit.best.fit.is_white for fit in fitted.fits if fit.related)
 
 
@@ -211,19 +212,19 @@ def _with(question: Question, finding: Finding) -> Question:
 
 
 def _moves(question: Question) -> bool:
-    """Whether the output and every input still move."""
+    """Whether the output and every input move."""
     inputs = question.aligned.inputs
     return question.moves and all(np.ptp(source.values) > 0.0 for source in inputs)
 
 
 def _fitted(question: Question, seen: Imperfections) -> OutputFit:
-    """Plain dynamics, or an integrator."""
+    """Fit plain dynamics and integrators; all structures if none of these is allowed."""
     names = tuple(name for name in question.structures if name in (*PLAIN, *INTEGRATING))
     return fit_once(question, seen, names or question.structures)
 
 
 def _words(question: Question) -> _Suspect | None:
-    """The output without words that repeat, far from the values around them."""
+    """The question without fixed words in the output: equal values, far from those around."""
     output = question.output
     found = find_pulses(output.values, output.valid, equal=True)
     if found is None or np.mean(found) > FEW:
@@ -231,32 +232,33 @@ def _words(question: Question) -> _Suspect | None:
     value = output.values[np.argmax(found)]
     finding = Finding(
         code="fixed_word",
-        message=f"The output {output.name!r} stays far from the values around over "
-        f"{_samples(found)}, the first at {value:.6g}; they are left out. Look for a word that "
-        "means 'no value', or for loose contacts.",
+        message=f"The output {output.name!r} jumps far away and stays at one value over "
+        f"{_samples(found)}, first at {value:.6g}; these samples are left out. Look for a word "
+        "that means 'no value', or for loose contacts.",
         severity="info",
         parameters=(),
     )
-    left = replace(output, valid=output.valid & ~found)
-    return _Suspect(question=replace(question, output=left), finding=finding)
+    mended = replace(output, valid=output.valid & ~found)
+    return _Suspect(question=replace(question, output=mended), finding=finding)
 
 
 def _input_words(question: Question, i: int) -> _Suspect | None:
-    """An input without words that repeat, far from the values around them."""
+    """The question without fixed words in an input."""
     return _pulses(question, i, equal=True)
 
 
 def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
-    """An input without short pulses."""
+    """The question without short pulses in an input, or without fixed words if `equal`."""
     source, aligned = question.aligned.inputs[i], question.aligned
     found = find_pulses(source.values, source.valid, equal=equal)
-    if found is None or np.mean(found) > FEW:  # more are motion, as the pulses of a doublet
+    if found is None or np.mean(found) > FEW:  # more are a stimulus, such as a doublet's pulses
         return None
     finding = Finding(
         code="input_spikes",
-        message=f"The input {source.name!r} moves far out and back within {_samples(found)}, the "
-        f"first {aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but "
-        "the output does not respond: they count as lost. Look for lost bits or loose contacts.",
+        message=f"The input {source.name!r} jumps far away and back at {_samples(found)}, first "
+        f"{aligned.time[np.argmax(found)] - aligned.start:.4g} s after the beginning, but the "
+        "output does not respond: these samples count as lost. Look for lost bits or loose "
+        "contacts.",
         severity="info",
         parameters=(),
     )
@@ -264,16 +266,16 @@ def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | No
 
 
 def _repeats(question: Question, i: int) -> _Suspect | None:
-    """An input without samples that repeat the one before."""
+    """The question without samples of an input that repeat the previous one."""
     source = question.aligned.inputs[i]
     found = find_repeated(source.values)
     if found is None:
         return None
     finding = Finding(
         code="input_repeated",
-        message=f"The input {source.name!r} repeats the sample before to the last digit at "
-        f"{_samples(found)}, but the output shows that it moved: they count as lost. Look for "
-        "lost frames.",
+        message=f"The input {source.name!r} repeats the previous sample to the last digit at "
+        f"{_samples(found)}, but the output shows that it moved: these samples count as lost. "
+        "Look for lost frames.",
         severity="info",
         parameters=(),
     )
@@ -281,7 +283,7 @@ def _repeats(question: Question, i: int) -> _Suspect | None:
 
 
 def _standstills(question: Question, i: int) -> _Suspect | None:
-    """An input without stretches at which it stands still."""
+    """The question without standstills of an input."""
     source = question.aligned.inputs[i]
     found = find_standstills(source.values)
     if found is None:
@@ -289,7 +291,7 @@ def _standstills(question: Question, i: int) -> _Suspect | None:
     finding = Finding(
         code="input_frozen",
         message=f"The input {source.name!r} stands still over {_samples(found)}, but the output "
-        "shows that it moved: they count as lost. Look for lost updates.",
+        "shows that it moved: these samples count as lost. Look for lost updates.",
         severity="info",
         parameters=(),
     )
@@ -297,7 +299,7 @@ def _standstills(question: Question, i: int) -> _Suspect | None:
 
 
 def _slow_log(question: Question, i: int) -> _Suspect | None:
-    """A smooth input that the recorder reads by a slower clock, joined between its readings."""
+    """The question with an input interpolated that a slower clock records, if it is smooth."""
     source, fs = question.aligned.inputs[i], question.aligned.fs
     at = updates(source.values)
     if at is None or question.intersample is not None or not source.valid.all():
@@ -307,17 +309,18 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
         return None
     finding = Finding(
         code="input_slow",
-        message=f"The input {source.name!r} is recorded at {slow:.4g} Hz only, but the output "
+        message=f"The input {source.name!r} is recorded at only {slow:.4g} Hz, but the output "
         "shows that it moves between these samples: it is interpolated.",
         severity="info",
         parameters=(),
     )
-    otherwise = Finding(
+    undecided = Finding(
         code="input_slow",
-        message=f"The input {source.name!r} changes only at {slow:.4g} Hz and is taken as held; if "
-        f"it moved smoothly and is only recorded so slowly, the delay is {0.5 / slow:.3g} s "
-        "longer. This record does not distinguish the two: record the input faster, or state "
-        "intersample='zoh' (--intersample zoh) if the unit receives the held values.",
+        message=f"The input {source.name!r} changes at only {slow:.4g} Hz and is treated as held. "
+        "If it moved smoothly and only its record is so slow, the delay is "
+        f"{0.5 / slow:.3g} s longer. This record cannot distinguish the two: record the input "
+        "faster, or state intersample='zoh' (--intersample zoh) if the unit receives the held "
+        "values.",
         severity="doubt",
         parameters=TIMING,
     )
@@ -332,13 +335,14 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
         question.output, valid=question.output.valid & _follows_readings(source.values, at, slow)
     )
     smooth = replace(question, aligned=aligned, output=output, intersample="bandlimited")
-    return _Suspect(question=smooth, finding=finding, otherwise=otherwise)
+    return _Suspect(question=smooth, finding=finding, if_undecided=undecided)
 
 
 def _follows_readings(u: Real, at: NDArray[np.intp], slow: float) -> Mask:
-    """Samples, (n,), that do not respond to fast readings near the ends of the record.
+    """Samples, (n,), at which the interpolated input is accurate.
 
-    There is no band-limited interpolation near the ends, and a spline errs at a fifth of the rate.
+    Near the ends of the record a spline replaces the band-limited interpolation. It is inaccurate
+    if the input moves faster than a fifth of the slow rate there.
     """
     follows = np.ones(u.size, dtype=bool)
     if at.size > 2 * CROSSINGS:
@@ -362,7 +366,7 @@ def _without(question: Question, i: int, lost: Mask) -> Question:
 
 
 def _filled(question: Question, source: Signal, known: Mask) -> Signal:
-    """An input of which only these samples are known."""
+    """An input with all samples but the known ones interpolated."""
     aligned = question.aligned
     channel = Channel(name=source.name, time=aligned.time[known], values=source.values[known])
     clock = fit_clock(channel.time, nominal=aligned.fs)

@@ -24,10 +24,10 @@ __all__ = [
 _Real = NDArray[np.float64]
 
 _SMOOTH = 5
-"""Samples, on average, of twice a stretch that is too fast, from which on ramps are found whole."""
+"""Steps that are too fast, per end of a stretch of them, above which ramps are computed whole."""
 
 _AT_ONCE = 256
-"""Samples that are compared at once, and twice as many each time that is not enough."""
+"""Samples that are compared first; the number doubles until one fits."""
 
 
 def reversals(x: _Real) -> NDArray[np.intp]:
@@ -100,9 +100,9 @@ def rate_limited(x: _Real, step: float) -> _Real:
 
 
 def _limited_smoothly(x: _Real, step: float, starts: NDArray[np.intp]) -> _Real:
-    """The same, ramp by ramp, for a signal that seldom turns; it is too fast after `starts`."""
+    """The same, ramp by ramp, for a signal with few reversals; it is too fast after `starts`."""
     ramp, out, end = step * np.arange(x.size), x.copy(), 0
-    ahead = {way: way * x - ramp for way in (1.0, -1.0)}  # constant on a ramp that way
+    ahead = {way: way * x - ramp for way in (1.0, -1.0)}  # constant along a ramp in direction way
     while (k := starts.searchsorted(end)) < starts.size:
         lost = starts.item(k)
         way = 1.0 if x[lost + 1] > x[lost] else -1.0
@@ -112,12 +112,12 @@ def _limited_smoothly(x: _Real, step: float, starts: NDArray[np.intp]) -> _Real:
             out[begin:end] = way * (level + ramp[begin:end])
             way, level, begin = -way, -level - 2.0 * ramp.item(end - 1), end
             if end < x.size and ahead[way].item(end) <= level:
-                break  # it has caught up, else the signal has passed it
+                break  # the ramp has met the signal; otherwise the signal has turned past it
     return out
 
 
 def _first_up_to(values: _Real, level: float, begin: int) -> int:
-    """First place from `begin` on with a value up to a level; the number of values if none."""
+    """First index from `begin` on of a value up to a level; the number of values if none."""
     count = _AT_ONCE
     while begin < values.size:
         found = values[begin : begin + count] <= level

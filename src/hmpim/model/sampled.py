@@ -201,10 +201,10 @@ def spline_signs(degree: int) -> NDArray[np.float64]:
 
 
 def companion(denominator: NDArray[np.float64], chained: int) -> NDArray[np.float64]:
-    """State matrix of 1/A behind a chain of integrators, shape (n + chained, n + chained).
+    """State matrix of 1/A driven by a chain of integrators, shape (n + chained, n + chained).
 
-    The first n states are the output of 1/A and its derivatives. The first of the chain drives
-    them, the last stands still. The denominator is by rising powers of s, (n + 1,).
+    The first n states are the output of 1/A and its derivatives. The first state of the chain
+    drives them; the last is constant. The denominator is by rising powers of s, (n + 1,).
     """
     n = denominator.size - 1
     matrix = np.eye(n + chained, k=1)

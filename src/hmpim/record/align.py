@@ -110,8 +110,8 @@ def uniform(record: Record) -> Aligned:
     A record that is uniform already comes back with its own arrays, bit for bit; stamps that
     are merely rounded when printed are uniform. What else is done:
 
-    * Angles and counters that start again after a whole turn: turns are added, so that they
-      continue (see `hmpim.record.turns`).
+    * Angles and counters that start again after a whole turn: whole turns are added to remove
+      the jumps (see `hmpim.record.turns`).
     * Gaps: the clock runs on through them. Samples beside a gap stay as they are; inside it
       values are filled in and marked in `Signal.valid`.
     * Jitter of stamps whose samples were taken evenly: the samples are kept as they are

@@ -51,7 +51,7 @@ def restored(
 
 
 def updates(values: NDArray[np.float64]) -> NDArray[np.intp] | None:
-    """Samples at which a slower clock updates a channel, (m,); None if there is no such clock.
+    """Return the samples at which a slower clock updates a channel, (m,); None without one.
 
     Examples
     --------

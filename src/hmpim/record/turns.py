@@ -1,4 +1,4 @@
-"""Angles and counters that start again after a whole turn, continued as one motion."""
+"""Unwrap angles and counters that start again after a whole turn."""
 
 from dataclasses import dataclass, replace
 
@@ -18,30 +18,30 @@ _UNSTATED = ("", "count")
 """Units of a channel that may be an angle or a counter."""
 
 _COUNTERS = tuple(2.0**bits for bits in range(8, 33))
-"""Steps of counters of 8 to 32 bits."""
+"""Counts per turn of counters of 8 to 32 bits."""
 
 _SLOW = 0.25
-"""Largest part of a turn that an angle moves between samples if its direction is known: with noise
-or a gap of one sample it is then still less than half a turn."""
+"""Largest motion between samples, in turns, at which its direction is certain: it remains below
+half a turn with noise, or across a gap of one sample."""
 
 _FASTER = 2.0
-"""Ratio of the motion in a jump to the fastest elsewhere, up to which the jump is a whole turn: an
-angle that oscillates about its jump is fastest there."""
+"""Ratio of the motion across a jump, less the whole turn, to the fastest motion elsewhere, up to
+which the jump counts as a wrap: an angle that oscillates about the wrap is fastest there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Continued:
-    """A record without jumps by whole turns, and a finding for each channel that had some."""
+    """A record without jumps by whole turns, and a finding for each channel that had any."""
 
     record: Record
     findings: tuple[Finding, ...]
 
 
 def continue_turns(record: Record) -> Continued:
-    """Add whole turns to the inputs and outputs that start again after one.
+    """Add whole turns to inputs and outputs that start again after a turn, so that they continue.
 
-    The first sample of such a channel is then within half a turn of zero. A record without one
-    comes back as it is.
+    The first sample of such a channel is then within half a turn of zero. A record without such
+    channels is returned unchanged.
 
     Examples
     --------
@@ -73,19 +73,20 @@ def continue_turns(record: Record) -> Continued:
 def turn_of(values: NDArray[np.float64], unit: str = "", *, command: bool = False) -> float | None:
     """Return the turn after which a channel starts again, in its unit; None if it does not.
 
-    Every jump must be a whole turn, but for a motion hardly faster than elsewhere, where it is less
-    than a quarter of a turn between samples; and the values must not span more than a turn.
+    Every jump must be a whole turn, plus a motion of at most twice the fastest one elsewhere. That
+    one must be less than a quarter of a turn between samples. The values must not span more than a
+    turn.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
         Samples.
     unit : str
-        Their unit. Degrees and radians have one turn; a channel without a unit may be in either,
-        or a counter of 8 to 32 bits if its values are whole numbers.
+        Their unit. For degrees and radians the turn is known. A channel without a unit, or in
+        counts, may be in either, or be a counter of 8 to 32 bits if its values are whole numbers.
     command : bool
-        Whether the channel may be a sawtooth, whose jumps all have one direction. Without a unit
-        of angles, it must then jump in both.
+        Whether the channel is a command, which may be a sawtooth. Unless its unit is that of an
+        angle, it must then jump in both directions.
 
     Examples
     --------
@@ -98,8 +99,8 @@ def turn_of(values: NDArray[np.float64], unit: str = "", *, command: bool = Fals
         return None
     for turn in _candidates(values, unit):
         jumps = _jumps(values, turn)
-        beside = np.abs(steps[jumps == 0.0])
-        usual = float(beside.max(initial=0.0))
+        elsewhere = np.abs(steps[jumps == 0.0])
+        usual = float(elsewhere.max(initial=0.0))
         if span > turn or not jumps.any() or not 0.0 < usual < _SLOW * turn:
             continue
         if np.abs(steps - turn * jumps).max() > _FASTER * usual:
@@ -131,8 +132,8 @@ def _finding(channel: Channel, turn: float) -> Finding:
     return Finding(
         code="wrapped",
         message=(
-            f"{channel.name!r} jumps by nearly {turn:.6g}{unit} at {places}, since it starts again "
-            f"after a whole turn; whole turns were added, so that it continues{real}"
+            f"{channel.name!r} jumps by about {turn:.6g}{unit} at {places}, where it starts again "
+            f"after a whole turn; whole turns were added to remove the jumps{real}"
         ),
         severity="info",
         parameters=(),

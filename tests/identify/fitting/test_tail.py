@@ -1,4 +1,4 @@
-"""A slow tail: found where few bins show it, and never invented."""
+"""A slow tail is found where few bins show it, and not where there is none."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_dynamics_without_a_gain_at_dc_have_no_tail(name):
 
 
 def test_a_tail_that_no_structure_describes_is_a_doubt():
-    """Diffusion, exp(-sqrt(sT)): its tail has no time constant."""
+    """Diffusion, exp(-sqrt(sT)): its tail has no single time constant."""
     count = 1 << 18
     padded = np.concatenate([CHIRP, CHIRP[-1] * np.linspace(1, 0, 1600), np.zeros(count)])[:count]
     s = 2j * np.pi * np.fft.rfftfreq(count, 1 / (FS * FINE))

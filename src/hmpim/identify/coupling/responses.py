@@ -61,7 +61,7 @@ class Responses:
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
-    """Find which inputs the record distinguishes; refuse some that pass every frequency alike."""
+    """Find which inputs the record distinguishes; refuse inputs that it cannot separate."""
     found = input_set(
         [s.values for s in aligned.inputs],
         [s.name for s in aligned.inputs],

@@ -46,7 +46,7 @@ def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Itera
     """Clipping, hold and rounding: share, levels, period and step."""
     clipping, hold, rounding = found.saturation, found.hold, found.quantization
     if clipping is not None:
-        # A rectifier clips half, at one level.
+        # A rectifier clips half of the samples, all at one level.
         much = max(float(np.mean(side.at)) for side in clipping.sides) > NEARLY * MOST
         levels = [
             f"{name} {side.level:.6g} {unit}".rstrip()
@@ -58,7 +58,7 @@ def _of_levels(found: Imperfections, noise: Estimate | None, unit: str) -> Itera
             message=f"{100 * clipping.share:.1f} % of the samples are clipped "
             f"({', '.join(levels)}); the fit treats them as lying beyond the level. "
             + (
-                "At one level these are too many to rely on: lower the amplitude, or look for a "
+                "Too many are at one level for a reliable fit: lower the amplitude, or look for a "
                 "rectifier."
                 if much
                 else "Lower the amplitude to keep the whole range."

@@ -138,11 +138,11 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
         for one in found
         if one.joint is not lead.joint and one.gained > lead.gained - 2 * CLEARLY
     )
-    # With rich dynamics it may replace a missing pole, and is only a doubt; so it is if dynamics
-    # that change explain about as much.
+    # The change is only a doubt with rich dynamics, where it may replace a missing pole, and if a
+    # change of the delay or the dynamics explains about as much.
     plain = lead.joint.best.fit.structure.name in PLAIN
-    alone = lead.score.gain > elsewhere + CLEARLY
-    taken = lead.gained > 2 * CLEARLY and lead.white and plain and alone
+    clear = score.gain > elsewhere + CLEARLY
+    taken = lead.gained > 2 * CLEARLY and lead.white and plain and clear
     return GainChange(
         joint=lead.joint,
         taken=taken,
@@ -284,10 +284,10 @@ def scored(
 
 
 def _gain_elsewhere(problem: Problem, fit: Fit, rates: tuple[float, ...]) -> float:
-    """Gain in log-likelihood by a change of delay or dynamics, and not of the gain.
+    """Largest gain in log-likelihood if the delay or a parameter of the dynamics changes.
 
-    Such a change multiplies a derivative of the prediction as one of the gain multiplies its
-    motion. `rates` are as for `scored`.
+    The shape of the change multiplies the derivative by that parameter, as a change of the scale
+    factor multiplies the motion. `rates` are as for `scored`.
     """
     part = part_of(problem, fit.structure, fit.theta)
     shapes, most = _shapes(problem.y.size, rates), 0.0

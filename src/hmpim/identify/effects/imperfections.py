@@ -78,7 +78,7 @@ class Imperfections:
         return 0.0 if self.quantization is None else self.quantization.noise_std
 
     def floor(self, y: Real) -> float:
-        """R.m.s. rounding error of an output, (n,): by its steps, or by those of the arithmetic."""
+        """R.m.s. rounding error of an output, (n,): that of its steps, or of the arithmetic."""
         return max(self.rounding, ROUNDING * float(np.std(y)))
 
     def arrivals(self, samples: int, fs: float) -> Updates | None:

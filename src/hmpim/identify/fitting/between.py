@@ -61,13 +61,14 @@ def fit_under_each_assumption(
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
     def as_likely(parameters: int) -> float:
-        """Greatest objective of a fit with so many parameters that is about as likely."""
+        """Largest objective at which a fit with so many parameters is about as likely."""
         fewer = best.structure.parameters - parameters
         return least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
 
     def most(fit: Fit) -> float:
+        """Largest objective at which a fit is continued; the likelihood counts if noise is left."""
         own = as_likely(fit.structure.parameters) if best.is_white else np.inf
-        return min(own, TWICE * least)  # more of a residual that may follow the input
+        return min(own, TWICE * least)
 
     def moved(some: list[Fit]) -> Fits:
         return [

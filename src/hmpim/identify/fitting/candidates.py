@@ -359,20 +359,20 @@ def best_of(
 ) -> Fit:
     """The best of several starts, fitted to convergence if it may lead.
 
-    Unless the rivals are `far_off`, a start whose steps promise no chance against them, by residual
-    or by Schwarz's criterion, is given up. In a coloured residual few samples are independent, so
-    the precision is in units of those.
+    Unless the rivals are `far_off`, a start is given up if its steps promise a fit that cannot
+    compete with them by its residual or by Schwarz's criterion. In a coloured residual only some
+    samples are independent; the precision refers to these.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
     precision = _PRECISION / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     count = problem.counted * leading.share
     price = float(np.log(count)) / count
-    paid = min(  # by Schwarz's criterion
+    paid = min(  # objective at which Schwarz's criterion equals that of the best rival
         fit.objective * float(np.exp(price * (fit.structure.parameters - structure.parameters)))
         for fit in rivals
     )
-    if not far_off:  # fits that are about as likely widen the intervals
+    if not far_off:  # fits that are about as likely are needed: the intervals cover them
         hopeless = min(hopeless, paid * float(np.exp(2 * CLEARLY / count)))
     tried: list[Fit] = []
     for theta in starts:

@@ -345,7 +345,7 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 
 
 def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
-    """Fits with one slow tail, two, …, while each leaves white noise or is clearly likelier."""
+    """Fits with one slow tail, two, and so on, while each is white or clearly likelier."""
     data, problem, found = course.data, course.problem, list[Fit]()
     while data.keeps_samples:
         every = [*fits, *found]

@@ -64,8 +64,8 @@ def products(
     """Inner products of the rows of `jacobian` and of a residual, (n,), which comes last.
 
     They are summed in stretches, so that no row is as long as the record unless samples are
-    whitened. At each of the `edges`, samples, a new span begins; each span has products of its own,
-    (1 + len(edges), q, q). The residual is 0 where a sample does not count.
+    whitened. A new span begins at each sample in `edges`, and each span has its own products: the
+    shape is (1 + len(edges), q, q). The residual is 0 where a sample does not count.
     """
     part = part_of(problem, fit.structure, fit.theta) if part is None else part
     others, size, n = _others(problem, part), fit.theta.size, residual.size

@@ -260,7 +260,7 @@ def evaluating(
 ) -> Callable[[Sequence[Real]], Evaluation]:
     """Return a function that evaluates all inputs at given parameters, here by samples.
 
-    The kind of the first input's problem decides: others register a function of their own.
+    The kind of the first input's problem decides; other kinds register their own function.
     """
     known = _known(first)
 
@@ -348,8 +348,8 @@ def fit_together(
 ) -> list[Fit]:
     """Fit one output to several inputs at once, each with a structure and a start of its own.
 
-    There is a problem for each input; output, mask, whitening, nuisance and beginning are the first
-    one's. All else is as for `fit_structure`. Residual and cost are common to all fits.
+    There is a problem for each input; output, mask, whitening, nuisance and beginning are those of
+    the first. All else is as for `fit_structure`. All fits share residual and cost.
     """
     problems = list(map(kept_in_sample, problems, structures, thetas))
 

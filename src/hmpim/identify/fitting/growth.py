@@ -335,7 +335,8 @@ def grow(
     hidden : callable
         Tests a fit for one more pole.
     refit : callable
-        Fits a structure from a start, given the objective that it must promise to fall below.
+        Fits a structure from a start; gives up if it cannot reach the objective that is its third
+        argument.
     count : callable
         Independent samples for a tested pole, given the fit that has it.
     names : tuple of str
@@ -358,7 +359,7 @@ def grow(
             starts.append(_PROBE * test.scale)
         tried: list[F] = []
         for lag in starts:
-            least = min((one.fit.objective for one in tried), default=np.inf)
+            least = min((trial.fit.objective for trial in tried), default=np.inf)
             tried.append(refit(richer, with_pole(structure, best.fit.theta, lag), least))
         found = min(tried, key=lambda f: f.fit.objective)
         samples = count(test, found)

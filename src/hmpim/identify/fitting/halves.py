@@ -28,8 +28,8 @@ class Halves:
     # chance of so large a difference if one model were right for both and the noise white
     probability: float
     share: float  # of the residual's power that a model for each half would explain
-    # the same as an r.m.s. over that of the whole output. Not over a half's own: in one half of a
-    # sweep the output hardly moves, and friction is much of that but little of the record
+    # the same as an r.m.s., over that of the whole output. In one half of a sweep the output hardly
+    # moves; friction is much of that half, but little of the record
     owed: float
 
 

@@ -252,7 +252,7 @@ def give_up(course: Course, fitted: Fits) -> JointFit:
 def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
     """Compare all fits under one noise model, and polish the best.
 
-    Returned are the course with that model, all trials, the best, and the effective share.
+    Return the course with that model, all trials, the best trial, and the effective share.
     """
     data, seen = course.data, course.counted
     mode, leading = min(fitted, key=lambda item: item[1].objective)

@@ -1,13 +1,13 @@
 """A slow tail: one more pole, much slower than the others, with a zero close to it.
 
-A loop with an integral action, a bearing that creeps and a sensor that warms itself settle in the
-end by a per cent or so:
+With integral action in a loop, a creeping bearing or a self-heating sensor, the last per cent or so
+of a response settles slowly:
 
     (1 + (1 + d) sT) / (1 + sT) = 1 + d - d / (1 + sT).
 
-A sweep spends a few bins at frequencies around 1/T, too few to show in a test without a model. For
-a given T the log-likelihood is quadratic in d, and a score test of d (C. R. Rao, Proc. Camb. Phil.
-Soc. 44, 1948) costs one response.
+A sweep has only a few bins at frequencies around 1/T, too few for the test of lack of fit. For a
+given T the log-likelihood is quadratic in d, and a score test of d (C. R. Rao, Proc. Camb. Phil.
+Soc. 44, 1948) takes one response.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ from hmpim.model.response import slowest_time_constant
 __all__ = ["Tail", "fit_with_tail", "hidden_tail", "with_tail"]
 
 _STEP = 3.0
-"""Ratio of neighbouring time constants that are tested: responses to them are almost alike."""
+"""Ratio of successive time constants that are tested: their responses are almost alike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,13 +48,13 @@ def hidden_tail(problem: Problem, fit: Fit, *, share: float = 1.0) -> Tail | Non
     Parameters
     ----------
     problem, fit : Problem, Fit
-        The data, and a fit to them from rest. One that integrates, is zero at DC or is in
-        mid-motion has no tail that could be told from the rest.
+        The data, and a fit to them. A tail cannot be distinguished from an integrator, a washout
+        or the free response of a record that does not begin at rest: the result is then None.
     share : float
         Independent samples per sample.
     """
-    apart = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
-    if apart or fit.initial.size or fit.objective <= 0.0 or not _lags(fit).size:
+    excluded = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
+    if excluded or fit.initial.size or fit.objective <= 0.0 or not _lags(fit).size:
         return None
     lags, gains, sizes = _scores(problem, fit)
     k = int(np.argmax(gains))
@@ -89,7 +89,9 @@ def fit_with_tail(
 def with_tail(
     structure: Structure, structures: tuple[StructureName, ...] = tuple(STRUCTURES)
 ) -> Structure | None:
-    """Return the least structure with one more pole and one more zero; None if there is none.
+    """Return the structure with one more pole and at least one more zero; None if there is none.
+
+    It has as few zeros as possible.
 
     Examples
     --------
@@ -106,7 +108,7 @@ def with_tail(
 
 
 def _lags(fit: Fit) -> Real:
-    """Time constants in samples, from more than that of the fit to part of the record, (q,)."""
+    """Time constants in samples, from thrice the fit's slowest to 0.3 of the record, (q,)."""
     slowest = max(slowest_time_constant(fit.denominator), 1.0)
     steps = np.log(max(MUCH * fit.residual.size / slowest, 1.0)) / np.log(_STEP)
     return np.asarray(slowest * _STEP ** np.arange(1.0, int(steps) + 1.0))
@@ -119,7 +121,7 @@ def _start(fit: Fit, lag: float) -> Real:
 
 @kept
 def _scores(problem: Problem, fit: Fit) -> tuple[Real, Real, Real]:
-    """Time constants in samples, the gain in log-likelihood by each, and the size |d|, all (q,)."""
+    """Time constants in samples, the gain in log-likelihood of each, and the size |d|, all (q,)."""
     lags = _lags(fit)
     part = part_of(problem, fit.structure, fit.theta)
     moved = part.driven(fit.linear[:-1])
@@ -144,7 +146,7 @@ def _scores(problem: Problem, fit: Fit) -> tuple[Real, Real, Real]:
 
 
 def _lagging(x: Real, lag: float) -> Real:
-    """What a signal moves behind 1/(1 + sT), (n,), which is linear between its samples."""
+    """Response of 1/(1 + sT) to a signal less its first value, linear between samples, (n,)."""
     decay = float(np.exp(-1.0 / lag))
     weights = [1.0 - lag * (1.0 - decay), lag * (1.0 - decay) - decay]
     return np.asarray(scipy.signal.lfilter(weights, [1.0, -decay], x - x[0]))

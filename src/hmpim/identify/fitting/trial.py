@@ -38,8 +38,8 @@ class JointFit:
     forgotten: int
     effective_share: float  # independent samples per sample, from the best residual's correlation
     related: bool  # whether the best model explains more than a constant does
-    silent: bool = False  # whether no model can: the output does not answer the input at all
-    # fits with one more pole, under the chosen assumption, that lose only by its price
+    silent: bool = False  # whether no model can: the output does not respond to the input
+    # fits with one more pole, under the chosen assumption, that lose only by the extra parameter
     rivals: tuple[Trial, ...] = ()
     hidden: HiddenPole | None = None  # the test for one more pole; None if it was not made
 

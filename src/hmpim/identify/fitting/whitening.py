@@ -59,7 +59,7 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
 def is_likelier(data: Data, problem: Problem, found: Fit, best: Fit) -> bool:
     """Whether a richer fit is clearly likelier than the best one, each in noise of its own colour.
 
-    In a common colour the comparison would favour the fit whose residual it is.
+    One common colour would favour the fit from whose residual it is estimated.
     """
 
     def criterion(fit: Fit) -> float:
@@ -67,7 +67,7 @@ def is_likelier(data: Data, problem: Problem, found: Fit, best: Fit) -> bool:
         coloured = problem.coloured(noise)
         again = refit(coloured, fit)
         parameters = fit.structure.parameters + noise.size - 1
-        count = problem.counted  # the samples before the first whitened ones are so few
+        count = problem.counted  # whitening omits few samples, but more for a longer filter
         return schwarz(again.objective * count / coloured.counted, count, parameters)
 
     return criterion(best) - criterion(found) > 2 * CLEARLY

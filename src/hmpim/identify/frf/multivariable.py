@@ -48,7 +48,7 @@ _TERMS = NUMERATOR + 1
 _IDENTICAL = 1e-6
 _RATIO = 1.6
 _STEPS = 3
-# Most frequencies, spaced by a constant ratio.
+# Greatest number of frequencies, which are spaced by a constant ratio.
 _POINTS = 200
 # Bins in all windows of one width, beyond which they cost too much.
 _AFFORDABLE = 60_000
@@ -65,7 +65,7 @@ class JointResponse:
     """Frequency responses of one output to m inputs, measured at once."""
 
     # of each input, at the frequencies where the inputs can be separated. The coherence is partial:
-    # the share that the input explains of the residual of the others, less that of noise
+    # the share of the residual of the others that the input explains, less that of noise
     inputs: tuple[FrequencyResponse, ...]
     frequency: Real  # (f,): Hz
     # (f,): share of the output's power in the window that all inputs together explain, less the
@@ -181,7 +181,7 @@ def _input_condition(u: Complex, centre: Integer) -> Real:
 
 
 def _moved(u: Real, late: float, base: int) -> Complex:
-    """Transforms of the inputs, delayed by what a delay in samples has beyond `base` whole ones."""
+    """Transforms of the inputs, delayed by `late` less `base` samples."""
     length = u.shape[1] - base
     count = (length - 1) // 2 + 1
     turn = np.exp(-2j * np.pi * ((late - base) * np.arange(count)) / length)

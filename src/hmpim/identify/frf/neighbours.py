@@ -41,7 +41,7 @@ RIDGE = 1e-13
 """Share of each diagonal element that is added to normal equations."""
 
 NOTHING = 1e-24
-"""Power of U, over its greatest, that counts as zero."""
+"""Power of U, over its maximum, that counts as zero."""
 
 Integer = NDArray[np.int64]
 

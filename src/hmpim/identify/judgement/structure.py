@@ -122,7 +122,7 @@ def missed_pole(evidence: Evidence) -> Iterator[Finding]:
 def missed_tail(evidence: Evidence) -> Iterator[Finding]:
     """Doubt the figures at DC if the record shows a slow tail that the model lacks.
 
-    The response within the band hardly changes with it.
+    A slow tail hardly changes the response within the band.
     """
     joint, fs = evidence.joint, evidence.fs
     if evidence.nonlinear > MOST or not evidence.has_samples:
@@ -134,7 +134,7 @@ def missed_tail(evidence: Evidence) -> Iterator[Finding]:
         code="other_dynamics",
         message="The record requires slower dynamics than the model has: the output settles by "
         f"{100 * tail.size:.2g} % with a time constant of about {tail.lag / fs:.2g} s, and no "
-        "structure that may be chosen describes that. The figures at DC may be off by as much. "
+        "available structure describes this. The figures at DC may be off by as much. "
         "Sweep lower, or record longer.",
         severity="doubt",
         parameters=AT_DC,

@@ -93,7 +93,7 @@ def bends(
 
     None is found if the odds for the likeliest are below 400 to 1; else every kind that explains
     nearly as much, because no trace is exact. The input has shape (n,), the problem is weighted by
-    its noise. Effects up to `floor` are ignored, the r.m.s. error of rounding.
+    its noise. Effects up to `floor`, the r.m.s. rounding error, are ignored.
     """
     given = fit
     u, problem, fit = _shortened(u, problem, fit, intersample)

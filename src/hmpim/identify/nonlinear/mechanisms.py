@@ -202,8 +202,8 @@ def hypotheses(
     """Every kind with every value to try.
 
     `x`, (n,), is the linear model's output less its bias; the denominator, by rising powers of s
-    per sample, is of the dynamics that a force acts on. With `fs` in Hz, speeds are per second.
-    With `every` = 3, the middle value of each three is tried.
+    per sample, is of the dynamics that a force acts on. With the rate `fs` in Hz, speeds are per
+    second. With `every` = 3, the middle value of each three is tried.
     """
     largest = float(np.max(np.abs(x)))
     step = np.gradient(x)

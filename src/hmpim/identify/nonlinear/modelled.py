@@ -71,7 +71,7 @@ class Modelled:
     trend: Real  # (n,): its effect on the output
     waits: Mask | None  # (n,): samples that do not depend on the linear part
     part: NonlinearPart  # what a model needs of it
-    others: Mapping[Kind, Fit] = field(default_factory=dict)  # kinds about as likely, with fits
+    others: Mapping[Kind, Fit] = field(default_factory=dict)  # fits of kinds about as likely
 
     def estimate(self, units: tuple[str, str]) -> Estimate:
         """The size with its interval; the units are the input's and the output's."""
@@ -94,9 +94,10 @@ _UNIT: dict[Kind, int] = {"dead_zone": 0, "backlash": 1, "friction": 1}
 
 
 def is_explained(u: Real, joint: JointFit, *, floor: float) -> bool:
-    """Whether no nonlinearity need be sought: plain dynamics leave white noise without a trace.
+    """Whether no nonlinearity is looked for.
 
-    The input has shape (n,); effects up to `floor` are rounding errors (r.m.s.).
+    This holds if plain dynamics leave white noise without a trace of a nonlinearity, for software
+    and for long records. The input has shape (n,); effects up to `floor`, an r.m.s., are rounding.
     """
     best, fit = joint.best, joint.best.fit
     if fit.structure.sampled or joint.problem.y.size > LONGEST:
@@ -117,7 +118,8 @@ def linear_starts(
     """
     if plain.is_white:
         return [plain]
-    hopeless = joint.best.fit.cost / PART**2  # `kinds_in_question` passes over such a fit
+    # `kinds_in_question` skips such a fit.
+    hopeless = np.inf if problem.filtered else joint.best.fit.cost / PART**2
     starts = {}
     if plain.structure.name == "second_order" and plain.delay > 0.0:
         start = np.append(plain.theta, np.log(MOST * plain.delay))
@@ -139,8 +141,8 @@ def kinds_in_question(
 ) -> dict[Kind, list[Fit]]:
     """Kinds that may explain the residual of linear fits, the likeliest first, with these fits.
 
-    None if poles explain what no nonlinearity can. Of a servo, friction is in question where play
-    looks likely as well.
+    Empty if poles explain what no nonlinearity can. For a servo only friction is considered, also
+    where backlash looks likely.
     """
     if problem.counted < _FEWEST:
         return {}
@@ -234,7 +236,7 @@ def _ahead(tried: list[Real], changes: list[Real]) -> Real:
 
 
 def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
-    """Whether most of a residual is rounding error, of that r.m.s.; a slow motion colours it."""
+    """Whether most of a residual is rounding error, of that r.m.s.; it need not be white."""
     return fit.cost < TWICE * problem.counted * rounding**2
 
 
@@ -269,11 +271,13 @@ def described(joint: JointFit, one: NonlinearRow, fs: float) -> tuple[Modelled, 
     own = covariance(tools, residual, freedom=freedom, white=is_white(residual))
     moves = _moved_rows(joint, one, np.sqrt(own.diagonal()))
     moved = jacobian(others, fit, *moves)[-len(tools) :]
-    sizes = np.sqrt(np.vecdot(tools, tools))
+    power = np.vecdot(tools, tools)
+    sizes = np.sqrt(np.where(power > 0.0, power, 1.0))
     rows, moved = tools / sizes[:, None], moved / sizes[:, None]
-    # What the record does not determine keeps its error: there the row's motion is left out.
+    # In directions that the record does not determine, the row is taken as fixed: they keep their
+    # errors.
     shift = np.linalg.pinv(rows @ rows.T, rcond=UNSEEN, hermitian=True) @ (rows @ moved.T)
-    turn = np.linalg.inv(np.eye(len(rows)) + shift) * sizes / sizes[:, None]
+    turn = np.linalg.pinv(np.eye(len(rows)) + shift) * sizes / sizes[:, None]
     own = turn @ own @ turn.T
     size, kind, row = float(fit.nuisance[-1]), one.kind, one.row
     if kind in ("hardening", "softening"):
@@ -346,11 +350,11 @@ def _stable_steps(fit: Fit, steps: Real) -> Real:
 def modelled_finding(one: Modelled, units: tuple[str, str]) -> Finding:
     """State which nonlinearity is part of the model; the units are the input's and the output's."""
     others = " or ".join(KIND_WORDS[kind] for kind in one.others)
-    instead = f" The record may contain {others} instead: the intervals allow for it."
+    doubt = f" The record may contain {others} instead: the intervals allow for it."
     return Finding(
         code=one.part.kind,
         message=f"The model includes {one.part.words}: {size_in_words(one.part, units)}."
-        f"{instead if others else ''} The figures are those of the linear part. Include this "
+        f"{doubt if others else ''} The figures are those of the linear part. Include this "
         "effect in a simulation, or keep the stimulus away from it.",
         severity="info",
         parameters=(),

@@ -73,7 +73,8 @@ class NonlinearRow:
 
     kind: Kind
     row: Real  # (n,): its effect on the output
-    made: Callable[[Problem, Fit, float], "NonlinearRow"]  # from data, their fit and a size
+    # makes the row from data, a fit to them and a size
+    remake: Callable[[Problem, Fit, float], "NonlinearRow"]
     counts: Mask | None = None  # (n,): samples that depend on the linear part; None if all do
     size: float = 0.0  # for which the row was made
     begins: int = 0  # first sample at which its effect is known: a gap may begin anywhere in it
@@ -84,8 +85,8 @@ class NonlinearRow:
     lag: float = 0.0  # of friction: between the command and the force, in samples
 
     def again(self, problem: Problem, fit: Fit) -> "NonlinearRow":
-        """The row from the data with this row, the last of its rows, and their fit."""
-        return self.made(problem, fit, float(fit.nuisance[-1]))
+        """Compute the row again from a fit to data of which it is the last row."""
+        return self.remake(problem, fit, float(fit.nuisance[-1]))
 
 
 def linear_part(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
@@ -182,9 +183,9 @@ def _dead(fine: Real, problem: Problem, fit: Fit, half: float) -> NonlinearRow:
     """A dead zone of half a width, of an input on the finer clock."""
     half = abs(half)
     row = -_through_model(sampled(np.clip(fine, -half, half)) / half, problem, fit)
-    made = partial(_dead, fine)
+    remake = partial(_dead, fine)
     return NonlinearRow(
-        kind="dead_zone", row=row, made=made, size=half, at="command", reach=_most(fine)
+        kind="dead_zone", row=row, remake=remake, size=half, at="command", reach=_most(fine)
     )
 
 
@@ -205,7 +206,7 @@ def _waiting(command: Command, problem: Problem, fit: Fit, half: float) -> Nonli
     counts[:begins] = False
     return NonlinearRow(
         kind="backlash",
-        made=partial(_waiting, command),
+        remake=partial(_waiting, command),
         row=moved,
         counts=counts,
         size=half,
@@ -226,7 +227,7 @@ def _rubbing(command: Command, lag: _Lag, problem: Problem, fit: Fit, force: flo
     return NonlinearRow(
         kind="friction",
         row=effect[::FINE] / force,
-        made=partial(_rubbing, command, lag),
+        remake=partial(_rubbing, command, lag),
         counts=moves[::FINE],
         size=force,
         at="force",
@@ -290,9 +291,9 @@ def _forced(
     z = z if shape is None else z + size * shape
     largest = _most(z)
     fine = -pushed(power_of(z, power, largest), per_step(fit.denominator, FINE))
-    made = partial(_forced, command, kind, power, shape=fine)
+    remake = partial(_forced, command, kind, power, shape=fine)
     return NonlinearRow(
-        kind=kind, row=np.asarray(fine[::FINE]), made=made, at="force", reach=largest
+        kind=kind, row=np.asarray(fine[::FINE]), remake=remake, at="force", reach=largest
     )
 
 
@@ -301,8 +302,8 @@ def _scaled(
 ) -> NonlinearRow:
     """A scale that changes with the deflection."""
     x = linear_part(data, fit, command.others)
-    largest, made = _most(x), partial(_scaled, command, kind, power)
-    return NonlinearRow(kind=kind, row=power_of(x, power, largest), made=made, reach=largest)
+    largest, remake = _most(x), partial(_scaled, command, kind, power)
+    return NonlinearRow(kind=kind, row=power_of(x, power, largest), remake=remake, reach=largest)
 
 
 def _most(x: Real) -> float:

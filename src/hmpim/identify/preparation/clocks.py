@@ -102,7 +102,7 @@ def _corrected(
     driven = [
         (model, waveform, source.values)
         for waveform, source in zip(aligned.waveforms, aligned.inputs, strict=True)
-        if (model := linear_model(found[channel.name, waveform.name])) is not None
+        if (model := linear_model(found[channel.name, waveform.name], fs=aligned.fs)) is not None
     ]
     if not driven:
         return signal

@@ -53,7 +53,7 @@ AT_DC = (
     "bandwidth_3db",
     "peak_gain_db",
 )
-"""Parameters at DC, or relative to the gain there, and the slowest time constant."""
+"""Parameters at DC or relative to the gain at DC, and the time constant."""
 
 BANDWIDTHS = tuple(f.name for f in fields(ResponseBandwidths))
 """Every bandwidth."""

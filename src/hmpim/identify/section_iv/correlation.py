@@ -125,7 +125,7 @@ def likeness(u: Real, y: Real, longest: int) -> Likeness:
 
 @kept
 def _around(u: Real, y: Real) -> Real:
-    """Products of both less their means, summed at every lag: from 0, then those below 0."""
+    """Correlation sums of both signals less their means, at lags from 0 up, then below 0."""
     length = int(scipy.fft.next_fast_len(2 * u.size - 1, real=True))
     spectrum = scipy.fft.rfft(y - y.mean(), length)
     spectrum *= _conjugate(u, length)

@@ -57,9 +57,9 @@ def identify_statistics(
 ) -> Identification:
     """Identify one pair from compressed records.
 
-    The input between its samples is the likeliest if it is not stated. Integrators are tried in any
-    case, and refused, as their memory is longer than any window; so are channels that do not move,
-    and too few samples.
+    If the input between its samples is not stated, the likeliest assumption is chosen. Integrators,
+    whose memory is longer than any window, channels that do not move, and too few samples raise a
+    `RecordError`.
     """
     _check_moves(statistics)
     data, joint = choose(statistics, intersample=intersample, structures=structures)

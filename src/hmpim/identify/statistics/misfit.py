@@ -24,8 +24,8 @@ _GROUPS = 12
 """Frequencies that are tested."""
 
 TESTABLE = 1e-6
-"""Share of the greatest direction, or of its own power, below which a direction is not tested: the
-model's parameters explain it."""
+"""Share of the largest direction, or of its own power, below which a direction is not tested,
+because the model's parameters explain it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
