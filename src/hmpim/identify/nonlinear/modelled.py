@@ -276,7 +276,9 @@ def described(joint: JointFit, one: NonlinearRow, fs: float) -> tuple[Modelled, 
     rows, moved = tools / sizes[:, None], moved / sizes[:, None]
     # In directions that the record does not determine, the row is taken as fixed: they keep their
     # errors.
-    shift = np.linalg.pinv(rows @ rows.T, rcond=UNSEEN, hermitian=True) @ (rows @ moved.T)
+    gram = rows @ rows.T
+    inverse = np.linalg.pinv(gram, rcond=UNSEEN, hermitian=True)
+    shift = inverse @ (rows @ moved.T) @ (gram @ inverse)
     turn = np.linalg.pinv(np.eye(len(rows)) + shift) * sizes / sizes[:, None]
     own = turn @ own @ turn.T
     size, kind, row = float(fit.nuisance[-1]), one.kind, one.row
