@@ -51,7 +51,7 @@ __all__ = [
     "settled_rows",
 ]
 
-_SERVOS: tuple[StructureName, ...] = ("third_order", "third_order_zeros")
+_SERVOS: tuple[StructureName, ...] = ("third_order", "third_order_zero", "third_order_zeros")
 """Dynamics of a servo whose force lags behind its command: of the kinds, friction acts in it."""
 
 _EITHER_WAY: tuple[Kind, ...] = ("hardening", "softening", "asymmetry", "curvature")
@@ -128,6 +128,8 @@ def linear_starts(
     for trial in sorted(joint.trials, key=lambda trial: -trial.fit.objective):
         if trial.fit.structure.name in _SERVOS:
             starts[trial.fit.structure.name] = trial.fit.theta
+    if _SERVOS[2] in starts:
+        starts.setdefault(_SERVOS[1], starts[_SERVOS[2]])
     servos = [
         fit_structure(problem, STRUCTURES[name], starts[name], hopeless=hopeless)
         for name in _SERVOS

@@ -267,6 +267,7 @@ def _lag_of_command(fit: Fit) -> float:
 _LAGS: dict[StructureName, tuple[_Lag, ...]] = {
     "second_order": (_no_lag,),
     "third_order": (_lag_of_servo, _lag_of_command),
+    "third_order_zero": (_lag_of_servo,),
     "third_order_zeros": (_lag_of_servo,),
 }
 """Lags between command and force that a structure may have."""
