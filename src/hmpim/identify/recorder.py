@@ -88,17 +88,21 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     [100, 300, 301]
     """
     size, moves = x.size, np.diff(x)
+    speeds = np.abs(moves)
+    # Of the _AROUND steps that end with step k, at place k + _AROUND.
+    largest = maximum_filter1d(np.pad(speeds, _AROUND), _AROUND, origin=_AROUND // 2)
+    sharp = np.flatnonzero(speeds > TWICE * largest[_AROUND - 1 :][: speeds.size]) + 1
+    if not sharp.size:
+        return None
     if equal:
         first, last = runs_of(np.concatenate([[False], moves == 0.0]))
-        long = last - first >= _LONGEST
+        long = (last - first >= _LONGEST) & np.isin(first - 1, sharp)
         begin, end = first[long] - 1, last[long]
     else:
-        begin = np.tile(np.arange(1, size - 1), _LONGEST)
-        end = begin + np.repeat(np.arange(1, _LONGEST + 1), size - 2)
+        begin = np.tile(sharp, _LONGEST)
+        end = begin + np.repeat(np.arange(1, _LONGEST + 1), sharp.size)
     inside = (begin > 0) & (end < size)
     begin, end = begin[inside], end[inside]
-    # Of the _AROUND steps that end with step k, at place k + _AROUND.
-    largest = maximum_filter1d(np.pad(np.abs(moves), _AROUND), _AROUND, origin=_AROUND // 2)
     usual = np.maximum(largest[begin + _AROUND - 2], largest[end + 2 * _AROUND - 1])
     out, back = moves[begin - 1], -moves[end - 1]
     fast = np.minimum(np.abs(out), np.abs(back)) > TWICE * usual
