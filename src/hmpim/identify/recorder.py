@@ -254,6 +254,8 @@ def _input_words(question: Question, i: int) -> _Suspect | None:
 def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
     """The question without short pulses in an input, or without fixed words if `equal`."""
     source, aligned = question.aligned.inputs[i], question.aligned
+    if np.unique(source.values).size < FEW * source.values.size:
+        return None  # a sequence of a few levels jumps from one to the other
     found = find_pulses(source.values, source.valid, equal=equal)
     if found is None or np.mean(found) > FEW:  # more are a stimulus, such as a doublet's pulses
         return None
