@@ -21,6 +21,7 @@ from hmpim.identify.effects.lost_samples import find_repeated, find_spikes
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
+from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import TIMING
 from hmpim.identify.worth import FEW, MOST, PART, TWICE
 from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
@@ -192,16 +193,15 @@ class _Search:
         earlier, later = self._power(before, counts), self._power(after, counts)
         if later == 0.0 or earlier == 0.0:
             return -np.inf
-        gain = np.count_nonzero(counts) * float(np.log(earlier / later))
-        lost = every & ~counts
+        gain, lost = 0.0, every & ~counts
         if suspect.long and lost.any():
-            whole, inside = self._power(before, every), self._power(after, lost)
-            gain = np.count_nonzero(counts) * float(np.log(whole / later))
-            gain += np.count_nonzero(lost) * float(np.log(whole / inside))
+            earlier, inside = self._power(before, every), max(self._power(after, lost), later)
+            gain = np.count_nonzero(lost) * float(np.log(earlier / inside))
+        gain += np.count_nonzero(counts) * float(np.log(earlier / later))
         return 0.5 * min(fit.effective_share for fit in related) * gain
 
     def _power(self, fitted: OutputFit, counts: Mask) -> float:
-        """Mean square of the residual."""
+        """Power of the residual about its mean."""
         return float(np.var((self.question.output.values - fitted.prediction)[counts]))
 
 
@@ -254,11 +254,11 @@ def _input_words(question: Question, i: int) -> _Suspect | None:
 def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
     """The question without short pulses in an input, or without fixed words if `equal`."""
     source, aligned = question.aligned.inputs[i], question.aligned
-    if np.unique(source.values).size < FEW * source.values.size:
-        return None  # a sequence of a few levels jumps from one to the other
     found = find_pulses(source.values, source.valid, equal=equal)
     if found is None or np.mean(found) > FEW:  # more are a stimulus, such as a doublet's pulses
         return None
+    if np.unique(source.values).size < FEW * source.values.size:
+        return None  # a sequence of a few levels jumps from one to the other
     finding = Finding(
         code="input_spikes",
         message=f"The input {source.name!r} jumps far away and back at {_samples(found)}, first "
@@ -334,13 +334,11 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
     known[at] = True
     values = _filled(question, source, known).values.copy()
     values[at[-1] :] = source.values[at[-1]]
-    read = replace(source, values=values)
-    inputs = (*question.aligned.inputs[:i], read, *question.aligned.inputs[i + 1 :])
-    aligned = replace(question.aligned, inputs=inputs)
+    read = _with_input(question, i, replace(source, values=values))
     output = replace(
         question.output, valid=question.output.valid & _follows_readings(source.values, at, slow)
     )
-    smooth = replace(question, aligned=aligned, output=output, intersample="bandlimited")
+    smooth = replace(read, output=output, intersample="bandlimited")
     return _Suspect(question=smooth, finding=finding, if_undecided=undecided)
 
 
@@ -360,15 +358,19 @@ def _follows_readings(u: Real, at: NDArray[np.intp], slow: float) -> Mask:
 
 def _samples(found: Mask) -> str:
     count = int(np.count_nonzero(found))
-    return f"{count} sample{'s' if count > 1 else ''} ({100 * count / found.size:.2g} %)"
+    return f"{count} sample{'s' if count > 1 else ''} ({percent(count / found.size)} %)"
+
+
+def _with_input(question: Question, i: int, source: Signal) -> Question:
+    """The question with another input `i`."""
+    inputs = (*question.aligned.inputs[:i], source, *question.aligned.inputs[i + 1 :])
+    return replace(question, aligned=replace(question.aligned, inputs=inputs))
 
 
 def _without(question: Question, i: int, lost: Mask) -> Question:
     """The question with these samples of input `i` filled in."""
-    aligned = question.aligned
-    source = _filled(question, aligned.inputs[i], aligned.inputs[i].valid & ~lost)
-    inputs = (*aligned.inputs[:i], source, *aligned.inputs[i + 1 :])
-    return replace(question, aligned=replace(aligned, inputs=inputs))
+    source = question.aligned.inputs[i]
+    return _with_input(question, i, _filled(question, source, source.valid & ~lost))
 
 
 def _filled(question: Question, source: Signal, known: Mask) -> Signal:

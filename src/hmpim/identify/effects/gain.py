@@ -18,7 +18,7 @@ from hmpim.identify.effects.disturbance import criterion_gain
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
-from hmpim.identify.fitting.least_squares import inverted, solved
+from hmpim.identify.fitting.least_squares import inverted, projected, scores
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.fitting.trial import JointFit
@@ -264,23 +264,18 @@ def scored(
         gram = _products_in_spans(problem, fit, part, motion, rates)
     else:
         gram = _products(problem, fit, part, _shapes(motion.size, rates) * motion)
-    rest, whole = _projected(gram, len(rates)), gram.diagonal()[-len(rates) - 1 : -1]
-    total, found = float(rest[-1, -1]), []
-    for k, rate in enumerate(rates):
-        power, along = float(rest[k, k]), float(rest[k, -1])
-        if total <= 0.0 or power <= _ALIKE * whole[k]:
-            continue
-        taken = min(along**2 / power / total, 1.0 - np.finfo(float).eps)
-        found.append(
-            Scored(
-                rate=rate,
-                motion=motion,
-                change=along / power,
-                std=float(np.sqrt(total * (1.0 - taken) / max(count, 1.0) / power)),
-                gain=-0.5 * count * float(np.log1p(-taken)),
-            )
+    *tested, total = scores(gram, len(rates), least=_ALIKE)
+    return tuple(
+        Scored(
+            rate=rate,
+            motion=motion,
+            change=float(change),
+            std=float(np.sqrt(total * (1.0 - taken) / max(count, 1.0) / power)),
+            gain=-0.5 * count * float(np.log1p(-taken)),
         )
-    return tuple(found)
+        for rate, change, power, taken in zip(rates, *tested, strict=True)
+        if power > 0.0
+    )
 
 
 def _gain_elsewhere(problem: Problem, fit: Fit, rates: tuple[float, ...]) -> float:
@@ -293,11 +288,7 @@ def _gain_elsewhere(problem: Problem, fit: Fit, rates: tuple[float, ...]) -> flo
     shapes, most = _shapes(problem.y.size, rates), 0.0
     for slope in part.slopes(fit.linear[:-1], fit.initial):
         gram = _products(problem, fit, part, shapes * slope)
-        rest, whole = _projected(gram, len(rates)), gram.diagonal()[-len(rates) - 1 : -1]
-        for k, power in enumerate(whole):
-            if rest[k, k] > _ALIKE * power and rest[-1, -1] > 0.0:
-                taken = float(rest[k, -1] ** 2 / rest[k, k] / rest[-1, -1])
-                most = max(most, min(taken, 1.0 - np.finfo(float).eps))
+        most = max(most, float(scores(gram, len(rates), least=_ALIKE)[2].max()))
     return -0.5 * problem.counted * float(np.log1p(-most))
 
 
@@ -322,17 +313,10 @@ def _products_in_spans(
     return np.asarray(np.sum(turn @ sums @ turn.transpose(0, 2, 1), axis=0))
 
 
-def _projected(gram: Real, count: int) -> Real:
-    """Products of the last `count` rows and the residual, orthogonal to the fit's derivatives."""
-    size = gram.shape[0] - count - 1
-    mixed = gram[:size, size:]
-    return np.asarray(gram[size:, size:] - mixed.T @ solved(gram[:size, :size], mixed))
-
-
 def _deviation(problem: Problem, fit: Fit, score: Scored) -> float:
     """Standard deviation of the change, with the rate at which it settles unknown."""
     part, rows = part_of(problem, fit.structure, fit.theta), score.rows
-    gram = _projected(_products(problem, fit, part, rows), len(rows))
+    gram = projected(_products(problem, fit, part, rows), len(rows))
     inverse = inverted(gram[:-1, :-1])
     rest = float(gram[-1, -1] - gram[-1, :-1] @ inverse @ gram[:-1, -1])
     return float(np.sqrt(max(rest, 0.0) / problem.counted * inverse[0, 0]))

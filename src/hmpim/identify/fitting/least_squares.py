@@ -7,7 +7,17 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Real
 from hmpim.identify.noise.covariance import WELL
 
-__all__ = ["UNSEEN", "added", "explained", "inverted", "solved", "solved_exactly", "without"]
+__all__ = [
+    "UNSEEN",
+    "added",
+    "explained",
+    "inverted",
+    "projected",
+    "scores",
+    "solved",
+    "solved_exactly",
+    "without",
+]
 
 UNSEEN = 1e-13
 """Share of the greatest eigenvalue below which the record does not determine a direction."""
@@ -78,6 +88,32 @@ def added(gram: Real, mixed: Real, own: Real, cross: Real, along: Real) -> tuple
     """
     shift = -solved(gram, mixed.T)
     return shift, own + mixed @ shift, along + shift.T @ cross
+
+
+def projected(gram: Real, count: int) -> Real:
+    """Products of the last `count` rows and the residual, the model's rows projected out.
+
+    `gram`, (q, q), holds the products of the model's rows, of these and of the residual.
+    """
+    size = gram.shape[0] - count - 1
+    mixed = gram[:size, size:]
+    return np.asarray(gram[size:, size:] - mixed.T @ solved(gram[:size, :size], mixed))
+
+
+def scores(gram: Real, count: int, *, least: float) -> tuple[Real, Real, Real, float]:
+    """Score test of each of the last `count` rows alone, for `gram` as for `projected`.
+
+    Returned are, (count,) each: the weight, the power with the model's rows projected out, and the
+    share of the residual's power that the row explains. A row of which less than the share `least`
+    is left has no power and explains nothing. The last value is the power of the residual.
+    """
+    rest, whole = projected(gram, count), gram.diagonal()[-count - 1 : -1]
+    along, power, total = rest[:-1, -1], rest.diagonal()[:-1], float(rest[-1, -1])
+    known = (power > least * whole) & (total > 0.0)
+    power = np.where(known, power, 0.0)
+    weights = np.where(known, along, 0.0) / np.where(known, power, 1.0)
+    taken = weights * along / (total or 1.0)
+    return weights, power, np.minimum(taken, 1.0 - np.finfo(float).eps), total
 
 
 def explained(

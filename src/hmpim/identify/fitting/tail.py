@@ -21,7 +21,7 @@ from hmpim.identify.fitting.candidates import best_of
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import one_more_pole, with_pole
-from hmpim.identify.fitting.least_squares import added
+from hmpim.identify.fitting.least_squares import scores
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.kept import kept
 from hmpim.identify.worth import MUCH, WORTH
@@ -128,21 +128,8 @@ def _scores(problem: Problem, fit: Fit) -> tuple[Real, Real, Real]:
     residual = problem.innovations(fit.prediction, fit.residual)
     rows = [_lagging(moved, lag) for lag in lags]
     gram = products(problem, fit, residual, *rows, part=part)[0]
-    first, last = len(gram) - 1 - lags.size, len(gram) - 1
-    own = gram[first:last, first:last]
-    _, rest, along = added(
-        gram[:first, :first],
-        gram[first:last, :first],
-        own,
-        gram[:first, last],
-        gram[first:last, last],
-    )
-    power = rest.diagonal()
-    known = power > np.finfo(float).eps * own.diagonal()
-    sizes = np.where(known, np.abs(along), 0.0) / np.where(known, power, 1.0)
-    shares = np.minimum(sizes**2 * power / gram[last, last], 1.0 - np.finfo(float).eps)
-    gains = -0.5 * problem.counted * np.log1p(-np.where(known, shares, 0.0))
-    return lags, gains, sizes
+    weights, _, shares, _ = scores(gram, lags.size, least=np.finfo(float).eps)
+    return lags, -0.5 * problem.counted * np.log1p(-shares), np.abs(weights)
 
 
 def _lagging(x: Real, lag: float) -> Real:
