@@ -19,6 +19,7 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.effects.lost_samples import find_repeated, find_spikes
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of
+from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.result.digits import percent
@@ -145,29 +146,41 @@ class _Search:
 
     question: Question
     seen: Imperfections = field(default_factory=Imperfections)
+    looked: bool = False
     fitted: OutputFit | None = None
 
     def examine(self, suspect: _Suspect | None) -> None:
         """Leave the suspect samples out if the record is then clearly likelier."""
         if suspect is None or not _moves(suspect.question):
             return
-        if self.fitted is None:
+        if not self.looked:
             inputs = [source.values for source in self.question.aligned.inputs]
-            self.seen = imperfections_of(self.question, inputs=inputs)
-            self.fitted = _fitted(self.question, self.seen)
-        again = _fitted(suspect.question, self.seen)
+            self.seen, self.looked = imperfections_of(self.question, inputs=inputs), True
+        before, again = self._compared(suspect)
         spikes = find_spikes(self.question.output.values, again.prediction)
         if spikes is not None and self.seen.spikes is None:
-            self.seen = replace(self.seen, spikes=spikes)
-            self.fitted = _fitted(self.question, self.seen)
-            again = _fitted(suspect.question, self.seen)
-        gain = self._gain(suspect, self.fitted, again)
+            self.seen, self.fitted = replace(self.seen, spikes=spikes), None
+            before, again = self._compared(suspect)
+        gain = self._gain(suspect, before, again)
         # Held or slowly recorded are two hypotheses; lost samples are searched for.
         searches = suspect.if_undecided is None
         if gain > (searched(self.question.output.values.size) if searches else CLEARLY):
             self.question, self.fitted = _with(suspect.question, suspect.finding), again
         elif suspect.if_undecided is not None and gain > -CLEARLY and _is_white(again):
             self.question = _with(self.question, suspect.if_undecided)
+
+    def _compared(self, suspect: _Suspect) -> tuple[OutputFit, OutputFit]:
+        """Fits to the record as it is, and without the suspect samples.
+
+        Of the output, these are first left out and then added: they may hide the response.
+        """
+        again = _fitted(suspect.question, self.seen)
+        if suspect.question.aligned is self.question.aligned:
+            more = self.question.output.valid & ~suspect.question.output.valid
+            return _counting_too(again, more), again
+        if self.fitted is None:
+            self.fitted = _fitted(self.question, self.seen)
+        return self.fitted, again
 
     def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
         """Gain in log-likelihood by leaving out what is lost.
@@ -225,6 +238,18 @@ def _fitted(question: Question, seen: Imperfections) -> OutputFit:
     """Fit plain dynamics and integrators; all structures if none of these is allowed."""
     names = tuple(name for name in question.structures if name in (*PLAIN, *INTEGRATING))
     return fit_once(question, seen, names or question.structures)
+
+
+def _counting_too(fitted: OutputFit, more: Mask) -> OutputFit:
+    """The same dynamics, fitted from where they ended with more samples of the output, (n,)."""
+    fits = []
+    for one in fitted.fits:
+        valid = one.problem.valid
+        if valid is not None:
+            valid = valid | (more & (np.arange(more.size) >= one.forgotten))
+        problem = replace(one.problem, valid=valid)
+        fits.append(replace(one.with_fit(refit(problem, one.best.fit)), problem=problem))
+    return replace(fitted, fits=tuple(fits))
 
 
 def _words(question: Question) -> _Suspect | None:
