@@ -34,6 +34,7 @@ from hmpim.identify.fitting.course import (
     turn_ahead,
 )
 from hmpim.identify.fitting.data import follows
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
@@ -110,15 +111,19 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     """Plain dynamics and a drift, if they leave white noise; None otherwise."""
     valid, former = counted_in(question, seen), course
 
-    def with_rows(rows: Real, _: bool) -> JointFit:
+    def begun(rows: Real) -> tuple[Problem, Fit]:
         nonlocal course
         course = continued(course, valid=valid, nuisance=rows)
+        return course.problem, course.best
+
+    def fitted(rows: Real) -> JointFit:
+        begun(rows)
         return chosen_of(course, question.plain)
 
     if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
 
-    found = with_plain_drift(former.problem, former.best, with_rows)
+    found = with_plain_drift(former.problem, former.best, begun, fitted)
     if found is None or not found[0].related:
         return None
     joint, drifting = found
@@ -240,17 +245,21 @@ def _plain_beside_drift(
     plain = OutputFit(fits=(first,))
     freed: OutputFit | None = None
 
-    def with_rows(rows: Real, leading_only: bool) -> JointFit:
+    def begun(rows: Real) -> tuple[Problem, Fit]:
+        joint = fit_once(question, seen, question.plain, rows, leading_only=True).fits[0]
+        return joint.problem, joint.best.fit
+
+    def fitted(rows: Real) -> JointFit:
         nonlocal plain
-        plain = fit_once(question, seen, question.plain, rows, leading_only=leading_only)
-        return plain.fits[0 if leading_only else asked]
+        plain = fit_once(question, seen, question.plain, rows)
+        return plain.fits[asked]
 
     def steadily(_: JointFit) -> JointFit | None:
         nonlocal freed
         freed = _all_free(question, plain, asked)
         return None if freed is None else freed.fits[asked]
 
-    found = with_plain_drift(first.problem, first.best.fit, with_rows, steadily)
+    found = with_plain_drift(first.problem, first.best.fit, begun, fitted, steadily)
     if found is None or not found[0].related:
         return None
     drifting = found[1]

@@ -42,6 +42,7 @@ _TRIED = 16
 _FEWEST = 100
 """Fewest samples that distinguish drift from noise: six for each degree of the polynomial."""
 
+_Begun = Callable[[Real], tuple[Problem, Fit]]
 _Fitted = Callable[[Real, bool], JointFit]
 _Steadily = Callable[[JointFit], JointFit | None]
 
@@ -78,7 +79,7 @@ def with_drift(
     plainly = is_white(joint.best.fit.residual)
     if not plainly:  # a drift can imitate missing dynamics
         joint = fitted(every, False)
-    columns = _shape(joint, every)
+    columns = _shape(joint.problem, joint.best.fit, every)
 
     gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
     if gain < 0.0:  # fewer rows explain no more
@@ -93,24 +94,27 @@ def with_drift(
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, fitted: _Fitted, steadily: _Steadily = lambda _: None
+    problem: Problem,
+    fit: Fit,
+    begun: _Begun,
+    fitted: Callable[[Real], JointFit],
+    steadily: _Steadily = lambda _: None,
 ) -> tuple[JointFit, Drifting | None] | None:
     """Add a drift to plain dynamics; keep it if that leaves white noise.
 
-    `problem` and `fit` are the data and the best plain fit with a constant bias. `fitted` makes the
-    joint fit of plain structures with rows for the drift; if its second argument is true, only
-    whether the residual is white matters. `steadily` and the values are as for `with_drift`.
+    `problem` and `fit` are the data and the best plain fit with a constant bias. `begun` makes the
+    plain fits with rows for the drift and returns the best of them and its data; `fitted` makes the
+    joint fit of plain structures. `steadily` and the values are as for `with_drift`.
 
     None if a constant bias is enough, if the model is as slow as a drift, or if the residual is not
     white.
     """
-    columns = drift_rows(problem.y.size)
-    joint = fitted(columns, True)
-    counted = joint.problem.counted
-    if counted < max(_FEWEST, MOST * problem.counted) or not is_white(joint.best.fit.residual):
+    every = drift_rows(problem.y.size)
+    data, free = begun(every)
+    if data.counted < max(_FEWEST, MOST * problem.counted) or not free.is_white:
         return None
-    columns = _shape(joint, columns)
-    joint = fitted(columns, False)
+    columns = _shape(data, free, every)
+    joint = fitted(columns)
     if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
         return None
     gain = criterion_gain(joint, len(columns), fit, problem)
@@ -211,13 +215,12 @@ def drift_rows(size: int) -> Real:
     return np.asarray(columns - columns.mean(axis=1, keepdims=True))
 
 
-def _shape(joint: JointFit, columns: Real) -> Real:
+def _shape(problem: Problem, fit: Fit, columns: Real) -> Real:
     """Choose the rows of the drift by Schwarz's criterion, shape (k, n).
 
     They are fitted to the residual plus the drift so far. The initial state stays free, as it
     resembles the beginning of a drift.
     """
-    problem, fit = joint.problem, joint.best.fit
     counts = slice(None) if problem.valid is None else problem.valid
     target = (fit.residual + problem.masked(fit.nuisance[: len(columns)] @ columns))[counts]
     count = problem.counted  # all samples: of a random walk, the more is removed the better
