@@ -13,6 +13,7 @@ from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import counted_in, fit, fit_once, started
+from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import Course, completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -20,6 +21,7 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.modelled import (
     ALIKE,
     described,
@@ -32,11 +34,11 @@ from hmpim.identify.nonlinear.modelled import (
 )
 from hmpim.identify.nonlinear.rows import Command, NonlinearRow, with_row
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import FEW, TWICE
+from hmpim.identify.worth import FEW, MOST, TWICE
 from hmpim.model.nonlinear import Kind
 from hmpim.record import Intersample
 
-__all__ = ["add_row", "add_row_of_leading", "fit_with_row"]
+__all__ = ["add_row", "add_row_of_leading", "fit_bent", "fit_with_row"]
 
 _Found = tuple[float, NonlinearRow, JointFit, OutputFit]
 """Gain in Schwarz's criterion by a row, the row, the fit with it, and the fit without it."""
@@ -68,6 +70,30 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
         covariances=(own,),
         gaining=None,
     )
+
+
+def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
+    """Plain dynamics with a nonlinearity that likely explains the residual, if that leaves noise.
+
+    It is tried if the likeliest kind by its trace leaves white noise or explains most of the
+    residual, or is friction, whose trace does not show where the unit sticks. None otherwise, and
+    if it may be a speed limit, which has no row.
+    """
+    if spans_record(course.best):
+        return None
+    u = question.aligned.inputs[0].values
+    kinds = bends(u, course.problem, course.best, intersample=course.natural)
+    if not kinds or not kinds[0].certain or any(one.kind == "rate_limit" for one in kinds):
+        return None
+    first = kinds[0]
+    if first.kind != "friction" and first.share < MOST and not first.white:
+        return None
+    joint = chosen_of(replace(course, others=()), question.plain, growing=False)
+    if not joint.related:
+        return None
+    plainly = replace(question, structures=question.plain)
+    fitted = add_row(plainly, seen, OutputFit(fits=(joint,), begun=course))
+    return None if fitted.bending is None else fitted
 
 
 def fit_with_row(

@@ -54,13 +54,17 @@ _CLEAR = 8
 
 
 def fit(
-    question: Question, seen: Imperfections, led: Led | None = None
+    question: Question,
+    seen: Imperfections,
+    led: Led | None = None,
+    bent: Callable[[Course], OutputFit | None] | None = None,
 ) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual requires them.
 
     If plain dynamics with levels or with a drift leave white noise, richer ones are not tried: they
-    would only imitate the effect. The levels found are returned with the fit. `led` is what `lead`
-    found, if it is known.
+    would only imitate the effect. The same holds for a nonlinearity that `bent` finds, with a
+    single input. The levels found are returned with the fit. `led` is what `lead` found, if it is
+    known.
     """
     begun = _begin(question, seen)
     if begun is None:
@@ -73,6 +77,9 @@ def fit(
     drifting = None if course.best.is_white else _drifting(question, seen, course)
     if drifting is not None:
         return seen, replace(drifting, begun=course)
+    bending = bent(course) if bent and not course.best.is_white else None
+    if bending is not None:
+        return seen, bending
     freed = free_from_wander(begun)
     calm = course if freed is begun else completed(freed)
     return seen, replace(_fit_and_look_for_rows(question, seen, calm), begun=course)

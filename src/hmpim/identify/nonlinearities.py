@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
-from hmpim.identify.added_row import add_row, add_row_of_leading, fit_with_row
+from hmpim.identify.added_row import add_row, add_row_of_leading, fit_bent, fit_with_row
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import fit, lead
@@ -23,12 +23,15 @@ __all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends
 
 
 def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
-    """Fit an output as `hmpim.identify.fits.fit`; with several inputs, first with a nonlinearity.
+    """Fit an output as `hmpim.identify.fits.fit`, first with a nonlinearity.
 
-    The levels found are returned with the fit.
+    With a single input only if one likely explains the residual of plain dynamics. The levels found
+    are returned with the fit.
     """
-    if len(question.aligned.inputs) == 1 or not _may_bend(question):
+    if not _may_bend(question):
         return fit(question, seen)
+    if len(question.aligned.inputs) == 1:
+        return fit(question, seen, bent=partial(fit_bent, question, seen))
     led = lead(question, seen)
     bent = fit_with_row(question, seen, *led)
     return fit(question, seen, led) if bent is None else (seen, bent)
