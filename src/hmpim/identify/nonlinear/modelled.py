@@ -330,9 +330,11 @@ def _moved_rows(joint: JointFit, one: NonlinearRow, scale: Real) -> Real:
         )
         return np.asarray(fit.nuisance[-1] * one.again(problem, moved).row)
 
-    for i, step in enumerate(_stable_steps(fit, scale)):
+    steps = _stable_steps(fit, scale)
+    steps[-2] = 0.0  # the effect does not depend on the bias
+    for i, step in enumerate(steps):
         if not step:
-            continue  # at the edge of the structure
+            continue  # also at the edge of the structure
         aside = np.zeros(vector.size)
         aside[i] = step
         out[i] = (effect(vector + aside) - effect(vector - aside)) / (2.0 * step)
