@@ -325,7 +325,9 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         )
     if not required and not any(fit.is_white for fit in richer):
         richer = []
-    richer = [*richer, *_with_tails(course, [*fits, *richer])]
+    tried = [*fits, *richer]
+    if min(fit.objective for fit in tried) < TWICE * best.objective:  # else `mode` is not natural
+        richer = [*richer, *_with_tails(course, tried)]
     if not richer:
         return course, fitted
     if course.counted.begins is not None:
