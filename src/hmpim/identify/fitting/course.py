@@ -170,9 +170,9 @@ def turn_ahead(course: Course) -> Course:
     count = np.count_nonzero(counted)
     if count < PART * level.size:
         return course
-    found = fit_plain(ahead.problem(course.natural, shorter), rough, course.plain or PLAIN)
-    least = min(f.objective for f in found) / count
-    if TWICE * least > best.objective / course.problem.counted:
+    problem, power = ahead.problem(course.natural, shorter), best.objective / course.problem.counted
+    found = fit_plain(problem, rough, course.plain or PLAIN, useless=power * count)
+    if TWICE * min(f.objective for f in found) > power * count:
         return course
     return replace(course, data=ahead, given=shorter, counted=shorter, fits=found)
 
@@ -266,9 +266,9 @@ def _in_motion(course: Course) -> Counted | None:
     if begun is None:
         return None
     problem = data.problem(course.natural, begun)
-    free = fit_plain(problem, data.rough, course.plain or PLAIN)
-    least = min(fit.objective for fit in free) / problem.counted
-    return begun if TWICE * least < course.best.objective / course.problem.counted else None
+    useless = course.best.objective / course.problem.counted * problem.counted
+    free = fit_plain(problem, data.rough, course.plain or PLAIN, useless=useless)
+    return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
 def _again(course: Course, fits: list[Fit]) -> list[Fit]:
