@@ -171,6 +171,7 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
+        self.begun: Course | None = None  # of a single input, with the rows that were tried last
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
@@ -206,7 +207,7 @@ class _WithRows:
         question, before = self.question, self.latest
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
-        self.latest = fit_once(question, self.seen, names, every, excluded=self.unrelated)
+        self.latest = self._fitted(names, every)
         if not self.several and not plainly and before is not self.first:
             self.latest = _as_before(question, self.seen, every, before, self.latest)
         found = self.latest.fits[self.asked]
@@ -215,6 +216,16 @@ class _WithRows:
         quiet = without_rows(found, slice(len(rows), None))
         self.hum = found.problem.y - quiet.problem.y
         return quiet
+
+    def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
+        """Fit all inputs with rows; plain fits of a single one are made once for the same rows."""
+        question, seen = self.question, self.seen
+        if self.several or question.intersample == "sampled":
+            return fit_once(question, seen, names, rows, excluded=self.unrelated)
+        if self.begun is None or not np.array_equal(self.begun.data.nuisance, rows):
+            self.begun = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
+        others = tuple(name for name in self.begun.others if name in names)
+        return OutputFit(fits=(chosen_of(replace(self.begun, others=others), names),))
 
     def steadily(self, _: JointFit) -> JointFit | None:
         """The same dynamics of several inputs with a constant bias, from a state that is free."""
