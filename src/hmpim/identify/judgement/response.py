@@ -8,7 +8,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS
 from hmpim.identify.judgement.evidence import Evidence
 from hmpim.identify.reading.bandwidth import are_apart
-from hmpim.identify.reading.figures import system_of
+from hmpim.identify.reading.figures import gradient, system_of, variance_of
 from hmpim.identify.result.groups import PHASE_SPLIT, in_words
 from hmpim.model.response import RationalDelay, phase, response
 from hmpim.record import Finding
@@ -71,20 +71,25 @@ def grazed_bandwidth(evidence: Evidence) -> Iterator[Finding]:
     if structure.order < 2 or structure.integrators or structure.dc_zeros or structure.sampled:
         return
     grid = np.geomspace(evidence.band[1] * 1e-3, evidence.band[1], _POINTS)
-    touched = []
+    turns = {}
     for name, curve in _heights(system, grid).items():
         found = getattr(p, name)
         place = _nearest_turn(grid, curve, np.inf if found is None else found.value)
-        if place is None:
-            continue
-        at = np.array([place])
+        if place is not None:
+            turns[name] = place
+    if not turns:
+        return
+    places = np.array([*turns.values()])
 
-        def height(vector: Real, name: str = name, at: Real = at) -> float:
-            return float(_heights(system_of(structure, vector, evidence.fs), at)[name][0])
+    def heights(vector: Real) -> Real:
+        found = _heights(system_of(structure, vector, evidence.fs), places)
+        return np.array([found[name][i] for i, name in enumerate(turns)])
 
-        error = float(np.sqrt(evidence.readings.variance(height)))
-        if abs(height(evidence.readings.vector)) < DEVIATIONS * error:
-            touched.append((name, place))
+    vector, own = evidence.readings.vector, evidence.readings.covariance
+    slopes = gradient(heights, vector).T
+    errors = np.sqrt([variance_of(slope, own) for slope in slopes])
+    near = np.abs(heights(vector)) < DEVIATIONS * errors
+    touched = [turn for turn, close in zip(turns.items(), near, strict=True) if close]
     if not touched:
         return
     yield Finding(
