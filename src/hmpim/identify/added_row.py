@@ -13,7 +13,7 @@ from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import counted_in, fit, fit_once, started
-from hmpim.identify.fitting.candidates import spans_record
+from hmpim.identify.fitting.candidates import is_poor, spans_record
 from hmpim.identify.fitting.course import Course, completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
@@ -76,10 +76,10 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
     """Plain dynamics with a nonlinearity that likely explains the residual, if that leaves noise.
 
     It is tried if the likeliest kind by its trace leaves white noise or explains most of the
-    residual, or is friction, whose trace does not show where the unit sticks. None otherwise, and
-    if it may be a speed limit, which has no row.
+    residual, or is friction, whose trace does not show where the unit sticks. None otherwise, also
+    if it may be a speed limit, which has no row, and where linear dynamics are clearly missing.
     """
-    if spans_record(course.best):
+    if spans_record(course.best) or is_poor(course.best, course.problem.spread):
         return None
     u = question.aligned.inputs[0].values
     kinds = bends(u, course.problem, course.best, intersample=course.natural)
