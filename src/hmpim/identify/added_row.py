@@ -47,7 +47,7 @@ _Found = tuple[float, NonlinearRow, JointFit, OutputFit]
 def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:
     """Add a row for backlash, a dead zone, friction, a spring or a bent scale if it leaves noise.
 
-    Not for clipped or held outputs, and not together with a changing gain.
+    Not for clipped or held outputs.
     """
     found = [
         (gain, row, joint, linear)
@@ -68,7 +68,6 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
         fits=(without_rows(chosen, slice(-1, None)),),
         bending=replace(bending, others=others),
         covariances=(own,),
-        gaining=None,
     )
 
 
@@ -263,8 +262,6 @@ def _with_rows(
     joint, source = fitted.fits[0], question.aligned.inputs[0]
     floor = seen.floor(question.output.values)
     if question.exact or is_explained(source.values, joint, floor=floor):
-        return
-    if fitted.gaining is not None and fitted.gaining.taken:
         return
     if seen.saturation is not None or seen.hold is not None:
         return

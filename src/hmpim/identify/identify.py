@@ -176,7 +176,7 @@ def identify_output(question: Question) -> Described:
         if not seen.counts_other_samples_than(before):
             break
         seen, fitted = fit_output(question, seen)
-    fitted = let_gain_change(question, seen, fitted)
     question, fitted = model_nonlinearity(question, seen, fitted)
+    fitted = let_gain_change(question, seen, fitted)
     fitted = through_reference(question, fitted)
     return describe(question, seen, fitted)

@@ -94,13 +94,13 @@ def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) 
     """Let the gain change during the record if that explains more; plain dynamics may then suffice.
 
     Only for a single input that the output follows; not for loops, software, clipped or held
-    outputs, nor with a nonlinearity that was found first. The checks handle one that explains more.
+    outputs, nor with a nonlinearity in the model. The checks handle one that explains more.
     """
     joint, aligned = fitted.fits[0], question.aligned
     if len(fitted.fits) > 1 or not joint.related or question.instrument or question.swapped:
         return fitted
     limited = seen.saturation is not None or seen.hold is not None
-    if question.exact or limited or fitted.bending is not None:
+    if question.exact or limited or fitted.bending or question.limited:
         return fitted
     steady = replace(question, output=replace(question.output, values=joint.problem.y))
     known, valid = joint.problem.nuisance, counted_in(question, seen)
