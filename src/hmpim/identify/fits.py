@@ -171,7 +171,8 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
-        self.begun: Course | None = None  # of a single input, with the rows that were tried last
+        # The rows that were tried last, and plain fits of a single input with them
+        self.begun: tuple[Real, Course] | None = None
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
@@ -222,10 +223,14 @@ class _WithRows:
         question, seen = self.question, self.seen
         if self.several or question.intersample == "sampled":
             return fit_once(question, seen, names, rows, excluded=self.unrelated)
-        if self.begun is None or not np.array_equal(self.begun.data.nuisance, rows):
-            self.begun = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-        others = tuple(name for name in self.begun.others if name in names)
-        return OutputFit(fits=(chosen_of(replace(self.begun, others=others), names),))
+        if self.begun is None or not np.array_equal(self.begun[0], rows):
+            self.begun = (
+                rows,
+                completed(free_from_wander(turn_ahead(started(question, seen, rows)))),
+            )
+        course = self.begun[1]
+        others = tuple(name for name in course.others if name in names)
+        return OutputFit(fits=(chosen_of(replace(course, others=others), names),))
 
     def steadily(self, _: JointFit) -> JointFit | None:
         """The same dynamics of several inputs with a constant bias, from a state that is free."""
