@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 import hmpim
 from hmpim.errors import RecordError
 from hmpim.identify.coupling.weak import whitening_of
+from hmpim.stimulus.axes import AxisPlan
 
 FS = 200.0
 TIME = np.arange(2000) / FS
@@ -289,3 +290,28 @@ def test_a_high_pass_alone_may_be_stated_for_inputs_that_do_not_follow():
     found = hmpim.identify(record, structures=["second_order_high_pass"])
     assert found["y", "u0"].structure == "second_order_high_pass"
     assert found["y", "u1"].parameters.scale_factor is None
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_couplings_to_inputs_that_are_alike_at_low_frequencies_are_both_found(seed):
+    limits = hmpim.Limits(position=5.0, velocity=200.0, acceleration=8000.0, unit="deg")
+    tops = {"roll": 80.0, "yaw": 60.0, "pitch": 50.0, "azimuth": 30.0, "elevation": 30.0}
+    plans = [AxisPlan(axis=axis, limits=limits, band=(0.2, top)) for axis, top in tops.items()]
+    designed = hmpim.design_axes(plans, duration=10.0, fs=500.0)
+    inputs = {axis: one.position for axis, one in zip(tops, designed, strict=True)}
+    w = 2 * np.pi * 20.0
+    models = {
+        "yaw": hmpim.Model(delay=0.005, scale_factor=0.01, denominator=(0.01, 1.0)),
+        "pitch": hmpim.Model(delay=0.005, scale_factor=1.0, denominator=(w**-2, 1.4 / w, 1.0)),
+        "elevation": hmpim.Model(delay=0.012, scale_factor=0.02, denominator=(0.03, 1.0)),
+    }
+    y = 0.2 + 0.02 * np.random.default_rng(seed).standard_normal(5000)
+    for axis, model in models.items():
+        y = y + hmpim.simulate(model, inputs[axis], fs=500.0, intersample="bandlimited")
+    driven = {axis: inputs[axis] for axis in models}
+    found = hmpim.identify(hmpim.Record.from_arrays(driven, {"y": y}, fs=500.0))
+    for axis, model in models.items():
+        gain, lag = found["y", axis].scale_factor, found["y", axis].delay_low_frequency
+        assert gain.value == pytest.approx(model.scale_factor, abs=4 * gain.spread)
+        late = model.delay + model.denominator[-2]
+        assert lag.value == pytest.approx(late, abs=4 * lag.spread)

@@ -421,6 +421,8 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
                 whitening=whitening,
                 nuisance=best.problem.nuisance,
             )
+            if names is not structures:
+                problem = pairs.apart(problem, j)
             fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
             pairs.put(j, fit)
         # Test none before all are fitted: inputs that are alike explain each other's share.

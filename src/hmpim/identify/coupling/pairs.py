@@ -69,6 +69,15 @@ class Pairs:
         least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
+    def apart(self, problem: Problem, i: int) -> Problem:
+        """A coupling's problem without the bins at which its input resembles another coupling's.
+
+        There, the first to be fitted would explain a share of the other's response as well.
+        """
+        minor = [(group - self.dominant, bins) for group, bins in self.alike]
+        shared = [bins for group, bins in minor if i in group and len(group) > 1]
+        return _apart([problem], shared)[0]
+
     def put(self, i: int, fit: JointFit) -> None:
         """Store one input's fit and the samples it counts; an unrelated input masks none."""
         self.fits[i] = fit
