@@ -36,6 +36,7 @@ RICH: tuple[StructureName, ...] = (
     "second_order_zero",
     "second_order_zeros",
     "third_order",
+    "third_order_zero",
     "third_order_zeros",
     "fourth_order",
     "fifth_order",

@@ -108,12 +108,14 @@ class HiddenPole:
     def may_hide(self) -> bool:
         """Whether a chain may hide one more pole that is slow, or that the estimate supports.
 
-        Not for two poles, which the paper's sensors have, nor for a sum of modes.
+        Not for two poles, which the paper's sensors have, nor for a sum of modes. Two poles with
+        zeros are seldom all of a servo.
         """
         far = self.limit > PART * self.scale or self.squared > self.std
         structure = self.fit.structure
         proper = structure.zeros == structure.dc_zeros
-        chain = structure.order <= 1 or (structure.order > 2 and proper)
+        servo = structure.order == 2 and structure.zeros > structure.dc_zeros == 0
+        chain = structure.order <= 1 or servo or (structure.order > 2 and proper)
         return chain and far
 
 
