@@ -43,8 +43,9 @@ def stimulus_for(table: MotionTable, axis: AxisName, *, fs: float, share: float)
     30 s from 1 Hz on instead of 10 s from 0.1 Hz.
     """
     weak = table.mode == "PVA" and axis in ("azimuth", "elevation")
+    samples = exact_bandwidth(table, axis=axis, fs=fs, hold="included")
     return design(
-        band=(1.0 if weak else 0.1, 1.5 * exact_bandwidth(table, axis=axis, fs=fs)),
+        band=(1.0 if weak else 0.1, 1.5 * samples),
         duration=30.0 if weak else 10.0,
         fs=fs,
         limits=table.limits_of(axis, travel=0.2 if weak else 1.5, share=share),

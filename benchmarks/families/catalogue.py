@@ -139,6 +139,8 @@ SYSTEMS = (
     family("geophone", "Second-order high pass", k.geophone, SWEEP),
     family("differentiator", "Behind a second-order lag", k.differentiator, SWEEP),
     family("lag behind a resonance", "A third pole", k.lag_behind_resonance, SWEEP),
+    family("servo with a zero", "A mode, a lag and a zero", k.servo(1), SWEEP),
+    family("servo with two zeros", "A mode, a lag and two zeros", k.servo(2), SWEEP),
 )
 
 INPUTS = (
@@ -151,6 +153,21 @@ INPUTS = (
     family("random-phase design", "Second order; rest to rest", SECOND, k.designed("random_phase")),
     family("smooth PRBS", "Second order; smooth transitions", SECOND, k.designed("prbs")),
     family("smooth steps", "Second order; smooth transitions", SECOND, k.designed("steps")),
+    family(
+        "velocity commands",
+        "A servo with a zero; command and velocity held",
+        k.servo(1),
+        k.faded(k.sweep("zoh")),
+        c.feedforward,
+    ),
+    family(
+        "acceleration commands",
+        "A servo with two zeros; command, velocity and acceleration held; the record states it",
+        k.servo(2),
+        k.faded(k.sweep("zoh")),
+        c.feedforward,
+        c.stated,
+    ),
     family("held sweep", "Second order; a converter at the rate", SECOND, k.sweep("zoh")),
     family(
         "held sweep, stated", "The same, and the record says so", SECOND, k.sweep("zoh"), c.stated

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from families.kinds import first_order, lines, log_uniform, second_order, sequence
 from families.simulate import linear_output
+from families.system import System
 from families.take import Figure, Take
 
 Condition = Callable[[Take], None]
@@ -36,6 +37,33 @@ def another_input(low: float, high: float) -> Condition:
         take.others[f"u{len(take.others) + 2}"] = drive.sampled()
 
     return spoil
+
+
+def feedforward(take: Take) -> None:
+    """The zeros act on a sweep before it is held: velocity and acceleration are commanded too."""
+    drive = take.drive
+    step = 1e-3 / drive.band[1]
+    waves = [
+        lambda t: drive.source(t),
+        lambda t: (drive.source(t + step) - drive.source(t - step)) / (2 * step),
+        lambda t: (drive.source(t + step) - 2 * drive.source(t) + drive.source(t - step)) / step**2,
+    ]
+
+    def simulate(system: System) -> np.ndarray:
+        weights = np.polynomial.polynomial.polyfromroots([-1.0 / t for t in system.leads])
+        weights = weights / weights[0]
+
+        def commanded(time: np.ndarray) -> np.ndarray:
+            every = zip(weights, waves, strict=False)
+            return np.asarray(sum(weight * wave(time) for weight, wave in every))
+
+        return linear_output(
+            replace(system, leads=()), replace(drive, source=commanded), start=take.start
+        )
+
+    clean = simulate(take.system)
+    take.y = take.y + clean - take.clean
+    take.clean, take.simulate, take.fed_forward = clean, simulate, True
 
 
 def operating_point(*, both: bool) -> Condition:
@@ -275,4 +303,4 @@ def slow_recorder(take: Take) -> None:
 def stated(take: Take) -> None:
     """The record says what its input does between the samples."""
     words = {"smooth": "bandlimited", "zoh": "zoh", "foh": "foh"}
-    take.intersample = words[take.drive.between]
+    take.intersample = "feedforward" if take.fed_forward else words[take.drive.between]

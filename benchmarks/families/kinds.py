@@ -203,6 +203,23 @@ def lag_behind_resonance(rng: Rng, drive: Drive) -> System:
     return around(rng, drive, pairs=((natural, log_uniform(rng, 0.05, 0.4)),), lags=(lag,))
 
 
+def servo(zeros: int) -> MakeSystem:
+    """A mode, a lag and one or two zeros, as of velocity and acceleration commands."""
+
+    def make(rng: Rng, drive: Drive) -> System:
+        natural = share_of(rng, drive, 0.15, 0.5)
+        lag = 0.159 / (natural * rng.uniform(1.5, 6.0))
+        leads = tuple(0.159 / (natural * rng.uniform(*span)) for span in _ZEROS[:zeros])
+        pair = (natural, float(rng.uniform(0.4, 0.9)))
+        return around(rng, drive, pairs=(pair,), lags=(lag,), leads=leads)
+
+    return make
+
+
+_ZEROS = ((0.5, 1.5), (1.8, 4.0))
+"""Frequencies of a servo's zeros, over that of its mode."""
+
+
 # --- inputs --------------------------------------------------------------------------------------
 
 
@@ -449,6 +466,22 @@ def after_a_step(make: MakeDrive) -> MakeDrive:
             return drive.source(time) + size * expit((time + before) / (0.5 * edge))
 
         return replace(drive, source=source, quiet=False)
+
+    return made
+
+
+def faded(make: MakeDrive, share: float = 0.1) -> MakeDrive:
+    """The same input from rest to rest: it fades in and out over a share of the record."""
+
+    def made(rng: Rng) -> Drive:
+        drive = make(rng)
+        edge, last = share * drive.duration, (drive.samples - 1) / drive.fs
+
+        def source(time: np.ndarray) -> np.ndarray:
+            inside = np.clip(np.minimum(time, last - time) / edge, 0.0, 1.0)
+            return drive.source(time) * np.sin(0.5 * np.pi * inside) ** 4
+
+        return replace(drive, source=source)
 
     return made
 

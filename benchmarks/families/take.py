@@ -114,6 +114,7 @@ class Take:
     references: dict[str, np.ndarray] = field(default_factory=dict)
     others: dict[str, np.ndarray] = field(default_factory=dict)
     simulate: Callable[[System], np.ndarray] | None = None
+    fed_forward: bool = False
     y_stamps: np.ndarray | None = None
 
     @property
@@ -255,13 +256,14 @@ def _inside_band(truth: dict[str, float], take: Take) -> Callable[[str], bool]:
 def _alternatives(take: Take, told: Information) -> list[System]:
     """The system under each other assumption between the samples that fits as well."""
     drive = take.drive
-    known = take.intersample or drive.every > 1 or take.simulate is not None
+    linear = take.simulate is None or take.fed_forward
+    known = take.intersample or drive.every > 1 or not linear
     if known or not take.telling or drive.samples > _LONG:
         return []
     vector = take.system.vector()
     found = []
     for between in get_args(Between):
-        if between == drive.between:
+        if between == drive.between and not take.fed_forward:
             continue
         here, left = vector, take.clean
         for _ in range(4):
@@ -318,13 +320,16 @@ def _held_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
         fs=fs,
         samples=1 + int(np.clip(take.drive.samples, 2, 20_000)),
     )
-    moved = replace(system, bias=0.0)
+    moved = replace(system, bias=0.0, leads=() if take.fed_forward else system.leads)
+    before = system.leads if take.fed_forward else ()
     ahead = int(np.ceil(max(-system.delay, 0.0) * fs)) + 2
 
     def at(frequency: np.ndarray) -> np.ndarray:
         h = linear_output(moved, impulse, start=-ahead / fs)
         time = (np.arange(h.size) - ahead) / fs
-        return np.array([h @ np.exp(-2j * np.pi * f * time) for f in frequency])
+        behind = np.array([h @ np.exp(-2j * np.pi * f * time) for f in frequency])
+        s = 2j * np.pi * np.asarray(frequency)
+        return behind * np.prod([1.0 + s * lead for lead in before], axis=0)
 
     return at
 

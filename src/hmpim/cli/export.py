@@ -41,6 +41,7 @@ class Between(StrEnum):
     ZOH = "zoh"
     FOH = "foh"
     BANDLIMITED = "bandlimited"
+    FEEDFORWARD = "feedforward"
 
 
 def export(

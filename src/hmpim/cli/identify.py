@@ -66,6 +66,7 @@ class Between(StrEnum):
     ZOH = "zoh"
     FOH = "foh"
     BANDLIMITED = "bandlimited"
+    FEEDFORWARD = "feedforward"
     SAMPLED = "sampled"
 
 
@@ -114,7 +115,8 @@ def identify(
         typer.Option(
             "--intersample",
             help="What the input does between samples. zoh: held; foh: linear; bandlimited; "
-            "sampled: software; auto: found from the record.",
+            "feedforward: held, as are its velocity and acceleration commands; sampled: software; "
+            "auto: found from the record.",
         ),
     ] = Between.AUTO,
     reference: Annotated[

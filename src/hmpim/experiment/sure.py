@@ -95,7 +95,7 @@ def begun_estimate(stimulus: Stimulus, intersample: Intersample | None) -> LiveE
     ----------
     stimulus : Stimulus
         What is played.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the input does between its samples; None where it is measured, and so smooth.
     """
     return LiveEstimator(

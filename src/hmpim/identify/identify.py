@@ -62,8 +62,9 @@ def identify(
     record : Record or Statistics
         Inputs and outputs of one test; every pair is identified. With the statistics of
         `hmpim.compress`, whatever needs samples is omitted, and a warning says so.
-    intersample : {'auto', 'zoh', 'foh', 'bandlimited', 'sampled'}
-        Whether the input is held, linear or band-limited between its samples; 'sampled' for
+    intersample : {'auto', 'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'}
+        Whether the input is held, linear or band-limited between its samples; 'feedforward' for
+        a command that is held together with its velocity and acceleration; 'sampled' for
         software, whose output samples follow from samples of its input. 'auto' uses what the
         record states, otherwise the most likely; if rounding is the only noise and no system in
         continuous time explains the record to within it, the unit is taken for software.

@@ -18,6 +18,7 @@ from hmpim.model.discrete import (
     Discrete,
     RowPiece,
     discretise,
+    is_exact_between,
     rows_between,
 )
 from hmpim.model.nonlinear import NonlinearPart
@@ -116,7 +117,7 @@ def chain_of(
         What comes after.
     fs : float
         Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}
         What the input does between its samples.
     band : float, optional
         Frequency in Hz up to which a band-limited input has content.
@@ -146,7 +147,7 @@ def chain_of(
     pieces: tuple[RowPiece, ...] = ()
     over_outputs = False
     between_error = 0.0
-    if period is not None and intersample == "bandlimited":
+    if period is not None and not is_exact_between(system, intersample):
         early = min(max(int(system.delay * fs + _GRACE) - 1, 0), _EARLY)
         system = replace(system, delay=max(system.delay - early / fs, 0.0))
         step = discretise(system, fs=fs, intersample=intersample, band=band)

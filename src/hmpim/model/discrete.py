@@ -9,7 +9,9 @@ the response that of the model over the excited band (`hmpim.model.causal`).
 Time is counted in samples here.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -21,11 +23,21 @@ from hmpim.model.causal import causal_filter
 from hmpim.model.filters import in_z
 from hmpim.model.fractions import modal_form
 from hmpim.model.response import RationalDelay, per_step, response
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
-__all__ = ["TAPS", "Discrete", "RowPiece", "discretise", "realised", "rows_between"]
+__all__ = [
+    "TAPS",
+    "Discrete",
+    "RowPiece",
+    "discretise",
+    "fed_forward_response",
+    "is_exact_between",
+    "realised",
+    "rows_between",
+]
 
 _Real = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
 
 TAPS = 3
 """Input samples that one step looks at: a fraction of a sample reaches over three of them."""
@@ -60,10 +72,10 @@ class Discrete:
     ----------
     fs : float
         Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}
         What the input does between its samples.
     prefilter : ndarray, shape (p,)
-        Taps on the input; [1] unless the input is band-limited.
+        Taps on the input; [1] unless the input is band-limited, or its derivatives are held too.
     delay : int
         Whole samples, those that the prefilter takes left out.
     fraction : float
@@ -149,7 +161,7 @@ def discretise(
         The model, in seconds; its delay at least 0, for a held input above -1 sample.
     fs : float
         Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}
         What the input does between its samples.
     band : float, optional
         Frequency in Hz up to which a band-limited input has content; a fifth of the rate by
@@ -174,13 +186,14 @@ def discretise(
         return _filter(system, fs)
     reach = min(band, 0.45 * fs) if band else 0.2 * fs
     ahead = 0
-    if intersample == "bandlimited":
+    exactly = is_exact_between(system, intersample)
+    if not exactly:
         ahead = min(max(int(total + _WHOLE) - 1, 0), LOOKAHEAD)
     rest = total - ahead
     whole = int(rest + _WHOLE)
     fraction = max(rest - whole, 0.0)
     generator, entry, output, through = realised(system, fs)
-    between: Intersample = "zoh" if intersample == "zoh" else "foh"
+    between: Intersample = "zoh" if is_held(intersample) else "foh"
     row = _row(generator, entry, output, through, fraction, 0.0, between)
     n = output.size
     transition, drive = _reached(generator, entry, fraction, 1.0, between)
@@ -202,11 +215,47 @@ def discretise(
         gain=1.0,
         band=reach,
     )
-    if intersample != "bandlimited":
+    if exactly:
         return plain
+    if intersample == "feedforward":
+        return _prefiltered(plain, partial(fed_forward_response, system, fs=fs), ahead)
     if not n and fraction == 0.0:  # a gain and whole samples: nothing lies between
         return replace(plain, delay=whole + ahead)
-    return _prefiltered(plain, system, ahead)
+    return _prefiltered(plain, partial(response, system), ahead)
+
+
+def is_exact_between(system: RationalDelay, intersample: Intersample) -> bool:
+    """Whether past samples determine what the input does between samples.
+
+    Not for a band-limited input, nor for derivatives of a command, which are computed from it.
+    """
+    if intersample == "feedforward":
+        return system.numerator.size == 1
+    return intersample != "bandlimited"
+
+
+def fed_forward_response(system: RationalDelay, frequency: _Real, *, fs: float) -> _Complex:
+    """Response from samples to samples if B(s) acts on a command before it is held.
+
+    Velocity and acceleration of the command are then held too, and only 1/A(s) and the delay, 0 or
+    more, are behind the hold.
+
+    Parameters
+    ----------
+    system : RationalDelay
+        The model, in seconds.
+    frequency : ndarray, shape (m,)
+        In Hz.
+    fs : float
+        Rate in Hz.
+
+    Returns
+    -------
+    complex ndarray, shape (m,)
+    """
+    behind = discretise(replace(system, numerator=np.ones(1)), fs=fs, intersample="zoh")
+    before = np.polynomial.polynomial.polyval(system.variable(frequency), system.numerator)
+    return np.asarray(before * behind.response(frequency))
 
 
 def _samples_late(system: RationalDelay, fs: float, intersample: Intersample) -> tuple[float, int]:
@@ -218,7 +267,7 @@ def _samples_late(system: RationalDelay, fs: float, intersample: Intersample) ->
     total = system.delay * fs
     if total >= -_WHOLE:
         return max(total, 0.0), 0
-    if intersample == "zoh" and total > _WHOLE - 1.0:
+    if is_held(intersample) and total > _WHOLE - 1.0:
         return total + 1.0, 1
     raise ArgumentError(
         f"delay {system.delay:.6g} s is negative; no program can run ahead of its input, so "
@@ -276,11 +325,13 @@ def _filter(system: RationalDelay, fs: float) -> Discrete:
     )
 
 
-def _prefiltered(plain: Discrete, system: RationalDelay, ahead: int) -> Discrete:
-    def wanted(f: _Real) -> NDArray[np.complex128]:
-        return response(system, f * plain.fs)
+def _prefiltered(plain: Discrete, exact: Callable[[_Real], _Complex], ahead: int) -> Discrete:
+    """A step with a filter on its input that makes the response the exact one, by frequency."""
 
-    def bare(f: _Real) -> NDArray[np.complex128]:
+    def wanted(f: _Real) -> _Complex:
+        return exact(f * plain.fs)
+
+    def bare(f: _Real) -> _Complex:
         return plain.response(f * plain.fs)
 
     designed = causal_filter(wanted, bare, ahead=ahead, band=plain.band / plain.fs)
@@ -411,7 +462,7 @@ def rows_between(step: Discrete) -> tuple[RowPiece, ...]:
     if step.intersample == "sampled":  # it is read when it has been calculated, as it then is
         now = np.concatenate([step.output @ step.transition, step.output @ step.drive + step.feed])
         return (RowPiece(start=0.0, stop=1.0, coefficients=now[None, :]),)
-    between: Intersample = "zoh" if step.intersample == "zoh" else "foh"
+    between: Intersample = "zoh" if is_held(step.intersample) else "foh"
     bend = 1.0 - step.fraction
     edges = [0.0, bend, 1.0] if _WHOLE < bend < 1.0 - _WHOLE else [0.0, 1.0]
     pieces = []

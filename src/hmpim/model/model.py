@@ -55,7 +55,7 @@ class Model:
         None for a reading at every sample.
     quantization_step : float or None
         The output is rounded to whole steps of this size, in its unit.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'}
         What the input does between its samples, as it was identified; 'sampled' for software,
         which sees the samples alone and runs at `fs`.
     fs : float or None
@@ -212,7 +212,7 @@ class Model:
             Input samples. Before the first the input stood there; in front of an integrator, at 0.
         t : array_like, shape (n,)
             Their times in s, evenly spaced. Readings of a held output count from time 0.
-        intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}, optional
             What the input does between its samples; as identified by default.
         rng : numpy.random.Generator or int, optional
             Adds noise drawn from it, one value a reading; none is added by default.
@@ -266,7 +266,8 @@ def _known(intersample: str) -> Intersample:
         if intersample == name:
             return name  # type: ignore[no-any-return]
     raise ArgumentError(
-        f"intersample = {intersample!r} is not known; use 'zoh', 'foh', 'bandlimited' or 'sampled'"
+        f"intersample = {intersample!r} is not known; use 'zoh', 'foh', 'bandlimited', "
+        "'feedforward' or 'sampled'"
     )
 
 
@@ -369,7 +370,7 @@ def simulate(
         Input samples.
     fs : float
         Rate in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}
         What the input does between its samples.
     rng : numpy.random.Generator or int, optional
         Adds measurement noise drawn from it; none is added by default.

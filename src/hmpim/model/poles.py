@@ -356,6 +356,8 @@ def rational_response(
     [0.0, 0.0, 0.393469, 0.632121]
     """
     denominator = np.trim_zeros(denominator, "b")
+    if source.derivatives is not None and numerator.size > 1:
+        source, numerator = source.combined(numerator), np.ones(1)
     found = expanded(numerator, denominator)
     if found is None:
         rows = delayed_response(source, delay=delay, denominator=denominator, powers=numerator.size)

@@ -18,7 +18,7 @@ from hmpim.model.friction import Rubbing
 from hmpim.model.nonlinear import NonlinearPart, forced
 from hmpim.model.operators import play, power_of, rate_limited
 from hmpim.model.response import RationalDelay, per_step
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
 __all__ = ["SteppedPart", "command_step", "kept", "stepped_part"]
 
@@ -121,7 +121,7 @@ def stepped_part(
             f"{part.words} and a held output cannot be stepped together; set hold_period=None or "
             "nonlinear=None"
         )
-    straight: Intersample = "zoh" if intersample == "zoh" else "foh"
+    straight: Intersample = "zoh" if is_held(intersample) else "foh"
     return SteppedPart(part=replace(part, between=straight), system=system, fs=fs)
 
 

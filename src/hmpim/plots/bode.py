@@ -289,7 +289,7 @@ def pair_bode(
         grid = np.geomspace(positive[0], positive[-1], 400)
     whole = model_curve(pair, grid, fs=fs)
     if whole is not None:
-        held = fs is not None and pair.intersample in ("zoh", "foh")
+        held = fs is not None and pair.intersample in ("zoh", "foh", "feedforward")
         word = f"model, input {INTERSAMPLE_WORDS[pair.intersample]}" if held else "model"
         period = pair.parameters.hold_period
         if fs is not None and period is not None:

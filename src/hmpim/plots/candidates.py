@@ -15,6 +15,7 @@ INTERSAMPLE_WORDS: "dict[Intersample, str]" = {
     "zoh": "held",
     "foh": "linear",
     "bandlimited": "band-limited",
+    "feedforward": "held with its derivatives",
     "sampled": "sampled (software)",
 }
 """What an input does between its samples, in words a reader knows."""

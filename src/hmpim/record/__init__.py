@@ -1,7 +1,7 @@
 """Records: time-stamped channels, each with its unit, and the quality of the data."""
 
 from hmpim.record.align import Aligned, Signal, uniform
-from hmpim.record.channel import BETWEEN, Channel, Intersample
+from hmpim.record.channel import BETWEEN, Channel, Intersample, is_held
 from hmpim.record.clock import Clock, fit_clock, rate_of
 from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
@@ -41,6 +41,7 @@ __all__ = [
     "inspect_record",
     "inspect_timing",
     "inspect_values",
+    "is_held",
     "on_grid",
     "propose",
     "rate_of",

@@ -64,7 +64,7 @@ class Aligned:
     findings : tuple of Finding
         What was found when the record was read, then what had to be repaired here: 'wrapped',
         'gaps', 'jitter', 'even_samples', 'rate', 'resampled'. Empty if nothing.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the inputs do between the samples here: as the record states, but 'bandlimited'
         where a held or linear one has its corners by a clock of its own.
     waveforms : tuple of Waveform
@@ -186,7 +186,9 @@ def uniform(record: Record) -> Aligned:
     else:
         grid = _common_grid(channels, clocks, clock)
         findings.extend(_clock_differences(record, clocks, clock))
-    between = record.intersample
+    # Derivatives of a command are held at its own samples.
+    fed = record.intersample == "feedforward" and not shared
+    between = "zoh" if fed else record.intersample
     waveforms: tuple[Waveform, ...] = ()
     if (between == "zoh" or between == "foh") and switches_beside(
         record.inputs, clocks, clock, between

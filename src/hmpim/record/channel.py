@@ -12,13 +12,25 @@ from hmpim.errors import RecordError
 from hmpim.tables import shortened
 from hmpim.units import check_unit
 
-__all__ = ["BETWEEN", "Channel", "Intersample", "frozen_samples", "in_seconds"]
+__all__ = ["BETWEEN", "Channel", "Intersample", "frozen_samples", "in_seconds", "is_held"]
 
-Intersample = Literal["zoh", "foh", "bandlimited", "sampled"]
-"""Held, linear or band-limited between its samples; or software, which sees the samples alone."""
+Intersample = Literal["zoh", "foh", "bandlimited", "feedforward", "sampled"]
+"""Held, linear or band-limited between its samples; held together with its derivatives, which are
+commanded too; or software, which sees the samples alone."""
 
 BETWEEN: tuple[Intersample, ...] = ("zoh", "foh", "bandlimited")
 """What a signal in continuous time may do between its samples: held, linear or band-limited."""
+
+
+def is_held(intersample: Intersample) -> bool:
+    """Whether an input stands still between its samples.
+
+    Examples
+    --------
+    >>> is_held("feedforward"), is_held("foh")
+    (True, False)
+    """
+    return intersample in ("zoh", "feedforward")
 
 
 @checked

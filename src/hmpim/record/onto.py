@@ -45,7 +45,7 @@ def on_grid(
         Instants in s, `fs` apart.
     fs : float
         Rate of the grid in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the channel does between its samples.
 
     Returns
@@ -55,7 +55,7 @@ def on_grid(
     known : bool ndarray, shape (m,)
         False inside gaps.
     """
-    smooth = intersample not in ("zoh", "foh")
+    smooth = intersample not in ("zoh", "foh", "feedforward")
     if smooth and is_reduced(channel, clock, fs):
         return _reduced(channel, clock, grid, fs)
     place = (grid - clock.start) * clock.fs
@@ -165,7 +165,7 @@ def _interpolated(
     fs: float,
 ) -> NDArray[np.float64]:
     time, values = channel.time, channel.values
-    if intersample == "zoh":
+    if intersample in ("zoh", "feedforward"):
         return _held(time, values, at + clock.rounding, 1.0 / fs)
     if intersample == "foh":
         return np.interp(at, time, values)
@@ -283,7 +283,7 @@ def _filled(
     after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
     before = after - 1
     t0, t1, v0, v1 = time[before], time[after], values[before], values[after]
-    if intersample == "zoh":
+    if intersample in ("zoh", "feedforward"):
         return np.asarray(v0)
     chord = (v1 - v0) / (t1 - t0)
     slope = np.diff(values) / np.diff(time)

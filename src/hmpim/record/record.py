@@ -45,7 +45,7 @@ class Record(ByValue):
         Nominal sampling rate in Hz.
     band : tuple of float or None
         Excited band in Hz, where known.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the inputs do between samples, where known.
     source : str
         Where the record comes from, for people.
@@ -146,7 +146,7 @@ class Record(ByValue):
             Unit by channel name; a channel not named has none.
         band : tuple of float, optional
             Excited band in Hz.
-        intersample : {'zoh', 'foh', 'bandlimited'}, optional
+        intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}, optional
             What the inputs do between samples, if known.
         references, auxiliary : mapping of str to array_like, shape (n,), optional
             What a loop was asked, and what is kept beside.

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "pair_pictures", "stimulus_picture"]
 
 
-_BETWEEN: dict[Intersample, str] = {"zoh": "held between", "foh": "joined linearly between"}
+_BETWEEN: dict[Intersample, str] = {
+    "zoh": "held between",
+    "foh": "joined linearly between",
+    "feedforward": "and its derivatives held between",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

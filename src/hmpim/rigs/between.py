@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
 __all__ = ["ContinuousInput", "between_samples"]
 
@@ -56,7 +56,7 @@ def between_samples(values: FloatArray, fs: float, intersample: Intersample) -> 
     """
     time = np.arange(values.size) / fs
     at: Callable[[FloatArray], FloatArray]
-    if intersample == "zoh":
+    if is_held(intersample):
         breaks = time
 
         def at(t: FloatArray) -> FloatArray:

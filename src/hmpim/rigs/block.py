@@ -262,7 +262,7 @@ class Layout:
     ----------
     channels : tuple of ChannelSpec
         At least one input and one output, names unique.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the inputs do between samples, where known.
     source : str
         Where the record comes from, for people.

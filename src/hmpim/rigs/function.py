@@ -40,7 +40,7 @@ class FunctionRig(Simulated):
         Which quantity of the motion is fed.
     output_unit : str or None
         None: the input's.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the record states about the input between samples. None, the default, states
         'sampled' for mode 'sample', and nothing for mode 'array', since the function may look
         ahead.

@@ -28,7 +28,7 @@ class Looks:
     ----------
     stimulus : Stimulus
         What is played; it has a band.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the input does between its samples; None where it is measured.
     """
 

@@ -44,6 +44,10 @@ MODELS = {
         delay=0.0123, scale_factor=1.0, numerator=(0.02, 1.0), denominator=(4e-4, 0.02, 1.0),
         noise_std=0.1,
     ),
+    "feedforward": Model(
+        delay=0.0123, scale_factor=1.0, numerator=(1e-4, 0.02, 1.0),
+        denominator=(1e-6, 5e-4, 0.03, 1.0), noise_std=0.1, intersample="feedforward", band=15.0,
+    ),
     "integrator": Model(
         delay=0.007, scale_factor=3.0, denominator=(0.03, 1.0, 0.0), noise_std=0.1, bias=-1.0
     ),

@@ -66,17 +66,6 @@ def test_feedforward_raises_the_bandwidth():
         assert 1.4 * p < pv < pva / 1.4
 
 
-@pytest.mark.parametrize(
-    ("mode", "hold"), [("P", "removed"), ("PV", "included"), ("PVA", "included")]
-)
-def test_what_is_exact_by_default_is_what_a_record_tells(mode, hold):
-    by_default, stated = (
-        exact_bandwidth(MotionTable(), axis="yaw", mode=mode, **given)
-        for given in ({}, {"hold": hold})
-    )
-    assert by_default == stated
-
-
 def test_slower_commands_cost_the_fast_axes_most():
     cost = {}
     for axis in AXES:

@@ -25,14 +25,17 @@ def accuracy(chain: Chain) -> str:
             "zoh": "held",
             "foh": "linear",
             "bandlimited": "band-limited",
+            "feedforward": "held",
             "sampled": "sampled",
         }[step.intersample]
         return (
             f"Exact at {step.fs:.9g} Hz for an input that is {between} between its samples, "
             "delay included."
         )
+    fed = "for a command that is held with its derivatives"
+    words = fed if step.intersample == "feedforward" else "for a band-limited input"
     return (
-        f"At {step.fs:.9g} Hz, for a band-limited input: response within {chain.error:.1e} of the "
+        f"At {step.fs:.9g} Hz, {words}: response within {chain.error:.1e} of the "
         f"model, delay included, up to {step.band:.4g} Hz; beyond, gain up to {step.gain:.3g}."
     )
 

@@ -156,7 +156,7 @@ def export(
         Output and input; the only pair that has a model by default.
     fs : float, optional
         Rate in Hz of programs that are stepped; that of the record by default.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}, optional
         What their input does between its samples; as identified by default.
     pade : int, optional
         Order of python-control's Padé approximation, 1 to 20; by default the least that is right

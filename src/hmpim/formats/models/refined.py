@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
+from hmpim.model.discrete import discretise, fed_forward_response
 from hmpim.model.fractions import modal_form
 from hmpim.model.response import per_step
+from hmpim.record import is_held
 
 __all__ = [
     "REFINE",
@@ -58,11 +60,26 @@ def refined_words(source: Source) -> str:
             f"{refined_error(source):.1e} of the model up to {f:.4g} Hz; response "
             "itself is exact."
         )
-    kind = {"zoh": "held", "foh": "linear"}[source.intersample]
+    kind = "held" if is_held(source.intersample) else "linear"
+    aliased = ""
+    if source.intersample == "feedforward" and source.model.system.numerator.size > 1:
+        aliased = (
+            f" Velocity and acceleration commands that are held too change its response by up to "
+            f"{_missed_commands(source, f):.1e} up to {f:.4g} Hz."
+        )
     return (
         f"simulate: for a {kind} input, the delay is right to 1/{2 * REFINE} of a sample; "
-        "response itself is exact."
+        f"response itself is exact.{aliased}"
     )
+
+
+def _missed_commands(source: Source, highest: float) -> float:
+    """Relative difference between derivatives of a held command, and held derivatives of it."""
+    frequency = highest * np.arange(1, 201) / 200
+    system = source.causal().system
+    held = discretise(system, fs=source.fs, intersample="zoh").response(frequency)
+    fed = fed_forward_response(system, frequency, fs=source.fs)
+    return float(np.max(np.abs(held / fed - 1.0)))
 
 
 def refined_values(source: Source) -> dict[str, Any]:

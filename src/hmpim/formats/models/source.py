@@ -17,7 +17,7 @@ from hmpim.identify import (
     to_model,
 )
 from hmpim.model import Chain, Model
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
 __all__ = ["LINEAR_PART", "Source", "ascii_of", "identifier", "source_of"]
 
@@ -49,7 +49,7 @@ class Source:
         Of hmpim.
     fs : float
         Rate in Hz at which stepped targets run.
-    intersample : {'zoh', 'foh', 'bandlimited'}
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}
         What the input does between its samples.
     note : str
         What the target has of a nonlinearity; empty of a linear unit.
@@ -96,7 +96,7 @@ class Source:
         A program that is stepped then knows what it needs: what is held at a sample has been
         answered since it moved.
         """
-        return self.intersample == "zoh" and -1.0 < self.model.delay * self.fs < 0.0
+        return is_held(self.intersample) and -1.0 < self.model.delay * self.fs < 0.0
 
     def program_lines(self, *, stepped: bool = False) -> list[str]:
         """Say what `lines` says, and what a program has in place of a negative delay.
@@ -178,7 +178,7 @@ def source_of(
         Output and input; the only one that has a model by default.
     fs : float, optional
         Rate in Hz of stepped targets; that of the record by default.
-    intersample : {'zoh', 'foh', 'bandlimited'}, optional
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'}, optional
         What the input does between its samples; as identified by default.
 
     Raises

@@ -119,7 +119,7 @@ class Contents:
         Nominal rate in Hz, where the file states it.
     band : tuple of float or None
         Excited band in Hz, where the file states it.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the inputs do between samples, where the file states it.
     source : str or None
         Where the data come from, where the file states it.

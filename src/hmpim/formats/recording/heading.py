@@ -43,7 +43,7 @@ class Heading(ByValue):
         Nominal rate in Hz.
     band : tuple of float or None
         Excited band in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the inputs do between samples.
     source : str
         Where the samples come from, for people.

@@ -41,7 +41,7 @@ from hmpim.identify.section_iv.spectrum import excited_band
 from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
 __all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together"]
 
@@ -407,6 +407,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     late = likeness(inputs[pairs.strong[0]], contribution(best), pairs.y.size // 2 - 1).lag
     others = [inputs[j] for j in weak]
     whitening = whitening_of(rest, others, late=late)
+    mode = "zoh" if is_held(mode) else mode  # feedforward acts on the servo of its own axis
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures

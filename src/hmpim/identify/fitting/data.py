@@ -20,7 +20,7 @@ from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import PRECISION, SampledInput, prepare_input
-from hmpim.record import Intersample
+from hmpim.record import Intersample, is_held
 
 __all__ = [
     "RETURNS",
@@ -149,8 +149,8 @@ def follows(data: Data, fit: Fit) -> bool:
 
 def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
     """Parameters as a start under another assumption: a held input has half a sample less delay."""
-    held = 0.5 * (float(origin == "zoh") - float(mode == "zoh"))
-    return np.asarray(theta + held * (np.arange(theta.size) == 0))
+    sooner = 0.5 * (float(is_held(origin)) - float(is_held(mode)))
+    return np.asarray(theta + sooner * (np.arange(theta.size) == 0))
 
 
 def polished(problem: Problem, fit: Fit) -> Fit:

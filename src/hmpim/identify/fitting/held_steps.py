@@ -14,11 +14,12 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.feedforward_rows import is_fed_forward
 from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
-from hmpim.model.sampled import companion
+from hmpim.model.sampled import SampledInput, companion
 
-__all__ = ["at_ends", "in_whole_samples", "kept_in_sample", "steps_through"]
+__all__ = ["at_ends", "in_whole_samples", "jumps", "kept_in_sample", "steps_through"]
 
 _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
@@ -29,6 +30,11 @@ there."""
 
 _FORGOTTEN = 1e-10
 """Share of a state that remains after part of a sample, below which it is unobservable."""
+
+
+def jumps(source: SampledInput, structure: Structure) -> bool:
+    """Whether an input that stands still and jumps is what the dynamics see."""
+    return source.degree == 0 and not is_fed_forward(source, structure)
 
 
 def steps_through(structure: Structure, *, held: bool) -> bool:
@@ -51,7 +57,7 @@ def in_whole_samples(structure: Structure, *, held: bool) -> bool:
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:
     """The problem with the delay kept in its sample, in the middle if no fraction is known."""
-    held = problem.source.degree == 0
+    held = jumps(problem.source, structure)
     stated = problem.shortest_delay == problem.longest_delay
     if stated or not steps_through(structure, held=held):
         return problem

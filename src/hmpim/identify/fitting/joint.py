@@ -30,6 +30,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import Fits, follows, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
+from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.identify.fitting.growth import (
     Growth,
@@ -75,7 +76,7 @@ def joint_fit(
     known : ndarray of bool, shape (n,), optional
         Input samples that were measured, not filled in. The output does not count until it has
         forgotten filled-in samples. All if None.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'}, optional
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'}, optional
         The input between samples, or 'sampled' for software, whose structures are filters; chosen
         by likelihood among the first three if None.
     structures : tuple of str
@@ -182,7 +183,8 @@ def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
     count = problem.counted * joint.weighed_share
     fit = polished(problem, leading.fit)
     trials = [trial for trial in joint.trials if trial is not leading]
-    for other in () if course.alone else BETWEEN:
+    fed: tuple[Intersample, ...] = ("feedforward",) if may_be_fed_forward(fit.structure) else ()
+    for other in () if course.alone else (*BETWEEN, *fed):
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
             trials.append(trial_of(other, moved, count))
@@ -263,9 +265,30 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
         fitted = refit_all(weighed, fitted, seen, hopeful=TWICE * leading.objective)
     count = course.problem.counted * (share if course.data.noise is None else 1.0)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
+    trials += _fed_forward(course, trials, count)
     chosen = likeliest_of(trials, course.natural)
     fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
     best = trial_of(
         chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
     )
     return course, [best if trial is chosen else trial for trial in trials], best, share
+
+
+def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
+    """The trials of servos with zeros, with velocity and acceleration held too, if zeros lead."""
+    leading = min(trials, key=lambda trial: trial.criterion)
+    known_between = course.alone or course.shared or not course.data.keeps_samples
+    if known_between or leading.fit.structure.name in PLAIN:
+        return []
+    most = TWICE * leading.fit.objective
+    known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
+    found = []
+    for trial in sorted(trials, key=lambda trial: trial.fit.objective):
+        structure = trial.fit.structure
+        if structure in known or not may_be_fed_forward(structure):
+            continue
+        known.add(structure)
+        problem = course.data.problem("feedforward", course.counted)
+        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", hopeless=most)
+        found.append(trial_of("feedforward", fit, count))
+    return found

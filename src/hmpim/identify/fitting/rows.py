@@ -217,10 +217,9 @@ class Part(Driven):
         `numerator`, (m,), holds the weights of `rows`, `initial` those of `free`, (order,) or (0,).
         """
         structure = self.structure
-        full: Real = numerator @ self._numerators
-        out = self._added(self._poles.slopes(full), here)
+        out = self._driven_slopes(numerator, here)
         if structure.integrators and self._source.first:
-            out[0] -= full[0] * self._source.first * (self._since()[here] > 0.0)
+            out[0] -= numerator[0] * self._source.first * (self._since()[here] > 0.0)
         start, stop, _ = here.indices(self._source.samples)
         first, last = max(start, self._lasts.start), min(stop, self._lasts.stop)
         if initial.size and first < last:
@@ -232,10 +231,21 @@ class Part(Driven):
             moved += self._freely(free.double[1:]) @ (self._late[span] * waves)
         return out
 
-    def _added(self, expansion: Expansion, here: slice = slice(None)) -> Real:
+    def _driven_slopes(self, numerator: Real, here: slice) -> Real:
+        """Derivatives of the response to the input by theta."""
+        full: Real = numerator @ self._numerators
+        return self._added(self._poles.slopes(full), here)
+
+    def _added(
+        self,
+        expansion: Expansion,
+        here: slice = slice(None),
+        *,
+        answers: PoleResponses | None = None,
+    ) -> Real:
         """Sum of the responses of single poles, the input itself and its rate."""
         direct, rate = expansion.direct, expansion.rate
-        return self._answers.summed(
+        return (answers or self._answers).summed(
             expansion.simple,
             double=expansion.double if expansion.double.size else None,
             direct=direct if direct.any() else None,

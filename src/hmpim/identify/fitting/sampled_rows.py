@@ -4,6 +4,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
+from hmpim.identify.fitting.feedforward_rows import FeedforwardPart, is_fed_forward
 from hmpim.identify.fitting.rows import Driven, Part, Problem
 from hmpim.identify.kept import recent
 from hmpim.model.dynamics import Structure, coefficients_of
@@ -74,11 +75,12 @@ def part_of(problem: Problem, structure: Structure, theta: Real) -> Part | Sampl
     source = problem.source
     if source.degree == SAMPLES_ALONE:
         return SampledPart(problem, structure, theta)
+    kind = FeedforwardPart if is_fed_forward(source, structure) else Part
     made = recent(part_of, source.coefficients.nbytes)
     if made is None:
-        return Part(problem, structure, theta)
+        return kind(problem, structure, theta)
     key = (source, structure, theta.tobytes())
     if key not in made:
-        made[key] = Part(problem, structure, theta)
+        made[key] = kind(problem, structure, theta)
     part: Part = made[key]
     return part.begun(problem.begins)

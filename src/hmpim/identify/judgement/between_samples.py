@@ -13,7 +13,12 @@ __all__ = ["other_intersample", "undetermined_between", "wide_span"]
 _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 """Figures that move with the delay, or with the structure."""
 
-_WORDS = {"zoh": "held", "foh": "linear", "bandlimited": "band-limited"}
+_WORDS: dict[Intersample, str] = {
+    "zoh": "held",
+    "foh": "linear",
+    "bandlimited": "band-limited",
+    "feedforward": "held with its derivatives",
+}
 
 
 def other_intersample(evidence: Evidence) -> Iterator[Finding]:

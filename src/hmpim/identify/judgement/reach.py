@@ -18,7 +18,7 @@ from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.result.groups import BANDWIDTHS, MODELLED, PHASE_SPLIT, TIMING, in_words
 from hmpim.identify.worth import DEEPEST, FEW, PART, PAST, ROUNDING, TWICE
 from hmpim.model import response
-from hmpim.record import Finding
+from hmpim.record import Finding, is_held
 from hmpim.record.runs import runs_of
 
 __all__ = [
@@ -227,7 +227,7 @@ def negative_delay(evidence: Evidence) -> Iterator[Finding]:
     best = evidence.joint.best
     fit = best.fit
     by_a_lead = -fit.delay < max(TWICE * scale_of(fit), _STAMPED_LATE)
-    is_computed = best.intersample == "zoh" and abs(fit.delay + 1.0) < FEW
+    is_computed = is_held(best.intersample) and abs(fit.delay + 1.0) < FEW
     yield Finding(
         code="negative_delay",
         message=f"The delay is negative ({delay.value:.4g} s): the output moves before the "

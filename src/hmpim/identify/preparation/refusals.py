@@ -7,6 +7,7 @@ import numpy as np
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.fitting.enrich import MODES
+from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
 from hmpim.model.dynamics import FILTERS, STRUCTURES, StructureName
 from hmpim.record import Aligned, Intersample, Record
 
@@ -31,7 +32,7 @@ def checked_intersample(intersample: str, stated: Intersample | None) -> Intersa
     if intersample not in get_args(Intersample):
         raise ArgumentError(
             f"intersample {intersample!r} is not known; choose one of auto, zoh, foh, "
-            "bandlimited, sampled"
+            "bandlimited, feedforward, sampled"
         )
     return cast(Intersample, intersample)
 
@@ -41,10 +42,17 @@ def checked_structures(
 ) -> tuple[StructureName, ...]:
     """Return the structures to try; for software, filters."""
     known = list(FILTERS) if intersample == "sampled" else list(STRUCTURES)
+    if intersample == "feedforward":
+        known = [n for n, s in STRUCTURES.items() if not s.zeros or may_be_fed_forward(s)]
     wanted = tuple(structures) if structures is not None else tuple(known)
     for name in wanted:
         if name not in known:
             every = ", ".join(known).replace(", ".join(MODES[:-1]), "…")
+            if name in STRUCTURES and intersample == "feedforward":
+                raise ArgumentError(
+                    f"structure {str(name)!r} has zeros that feedforward does not make; choose "
+                    f"one of {every}, or state intersample='zoh'"
+                )
             raise ArgumentError(f"structure {str(name)!r} is not known; choose one of {every}")
     return cast(tuple[StructureName, ...], wanted)
 

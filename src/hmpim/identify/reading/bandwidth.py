@@ -17,7 +17,7 @@ from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import BANDWIDTHS
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model import RationalDelay, response
-from hmpim.model.discrete import discretise
+from hmpim.model.discrete import discretise, fed_forward_response
 from hmpim.record import Intersample
 
 __all__ = [
@@ -67,12 +67,15 @@ def sampled_response(
     It depends on the input between its samples, and on its aliases: for a first-order lag these are
     a percent of the response well below a quarter of the rate.
     """
-    if intersample not in ("zoh", "foh"):
+    if intersample in ("bandlimited", "sampled"):
         return response(system, frequency)
     whole = np.floor(system.delay * fs + 1e-9) / fs  # may be negative, unlike that of a program
     rest = replace(system, delay=max(system.delay - whole, 0.0))
-    stepped = discretise(rest, fs=fs, intersample=intersample)
-    return np.asarray(stepped.response(frequency) * np.exp(-2j * np.pi * frequency * whole))
+    if intersample == "feedforward":
+        samples = fed_forward_response(rest, frequency, fs=fs)
+    else:
+        samples = discretise(rest, fs=fs, intersample=intersample).response(frequency)
+    return np.asarray(samples * np.exp(-2j * np.pi * frequency * whole))
 
 
 def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:

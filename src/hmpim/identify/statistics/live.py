@@ -112,6 +112,8 @@ class LiveEstimator:
         check_argument("stimulus", stimulus, Stimulus)
         check_argument("window", window, float)
         check_argument("intersample", intersample, Intersample)
+        if intersample == "feedforward":
+            intersample = "zoh"  # the derivatives' aliases need samples
         lags = round(window * stimulus.fs)
         if lags < 8:
             raise ArgumentError(

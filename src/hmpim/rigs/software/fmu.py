@@ -60,7 +60,7 @@ class FmuRig(Simulated):
         Which quantity of the motion is fed.
     output_unit : str or None
         None takes the FMU's, or the input's where it states none.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the record says of the input in co-simulation; None leaves it open.
     name, input_name, output_name : str
         Name of the rig, and of its record's channels.

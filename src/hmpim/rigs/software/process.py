@@ -63,7 +63,7 @@ class ProcessRig(Simulated):
         Which quantity of the motion is fed.
     output_unit : str or None
         None takes what the program says, or else the input's.
-    intersample : {'zoh', 'foh', 'bandlimited', 'sampled'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the record says of the input between samples; a program sees samples only, so that
         None, the default, says 'sampled'.
     startup, answer : float

@@ -84,6 +84,6 @@ def table_hello(table: MotionTable, *, rate: float, watchdog: float) -> Hello:
         rate=rate,
         limits=table.limits,
         watchdog=watchdog,
-        intersample="zoh" if table.mode == "P" else "bandlimited",
+        intersample="zoh" if table.mode == "P" else "feedforward",
         source=f"simulated {table.name}, {table.mode}, over a wire",
     )

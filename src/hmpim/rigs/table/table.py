@@ -88,7 +88,7 @@ class MotionTable(Simulated):
     >>> from hmpim.experiment import run
     >>> record = run(table, {"pitch": sweep}, rng=0)
     >>> record.inputs[0].name, record.outputs[0].name, record.intersample
-    ('pitch.command', 'pitch.position', 'bandlimited')
+    ('pitch.command', 'pitch.position', 'feedforward')
     """
 
     specs: tuple[AxisSpec, ...] = FIG_4
@@ -360,10 +360,9 @@ class MotionTable(Simulated):
         Layout
             Inputs ``roll.command`` and so on, outputs ``roll.position``, both from the start
             position, in the stimulus's unit (outputs of axes held: deg). Held between samples in
-            mode P; in PV and PVA the held position is not the whole input, and the record says
-            'bandlimited', so that the response found is that of samples over samples. The
-            velocity commands of PV, and the acceleration commands of PVA, are auxiliary:
-            ``roll.velocity_command`` and so on.
+            mode P; in PV and PVA velocity and acceleration are held too, and the record says
+            'feedforward'. The velocity commands of PV, and the acceleration commands of PVA, are
+            auxiliary: ``roll.velocity_command`` and so on.
 
         Raises
         ------
@@ -419,7 +418,7 @@ class MotionTable(Simulated):
         ]
         return Layout(
             channels=(*inputs, *outputs, *feedforward),
-            intersample="zoh" if self.mode == "P" else "bandlimited",
+            intersample="zoh" if self.mode == "P" else "feedforward",
             source=f"simulated {self.name}, {self.mode}",
         )
 

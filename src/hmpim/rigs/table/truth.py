@@ -19,10 +19,8 @@ ComplexArray = NDArray[np.complex128]
 Hold = Literal["included", "removed"]
 """Whether a response contains what holding the command between its samples does.
 
-Position commands alone are a held input, and a fit that knows it finds the table behind the hold.
-Where velocity or acceleration commands are sent too, the held position is not the whole input:
-samples over samples is then what the record of the position command tells (`MotionTable.play`
-states so), the hold included.
+Commands are held, those of velocity and acceleration too. A fit that knows it, as the record states
+it, finds the table behind the hold.
 """
 
 _GRID = 0.25  # Hz; the phase turns by a few degrees at most in between
@@ -37,7 +35,7 @@ def linear_response(
     mode: CommandMode | None = None,
     operating_point: TablePosition | None = None,
     fs: float = 1000.0,
-    hold: Hold | None = None,
+    hold: Hold = "removed",
 ) -> ComplexArray:
     """Exact frequency response of the simulated table to a small command, friction off.
 
@@ -59,12 +57,10 @@ def linear_response(
         Where the axes stand; None for the table's start.
     fs : float
         Rate of the commands, Hz.
-    hold : {'removed', 'included'} or None
+    hold : {'removed', 'included'}
         'included' is the ratio of the samples' spectra, which slower commands make worse.
         'removed' divides by the hold's own response, which leaves the table behind the hold:
-        that is what a fit finds that knows the input is held, and what Fig. 4 is tuned to.
-        None for what `identify` finds in the table's own records: 'removed' in mode P,
-        'included' in modes PV and PVA.
+        that is what `identify` finds in the table's own records, and what Fig. 4 is tuned to.
 
     Returns
     -------
@@ -90,7 +86,7 @@ def linear_response(
     for axis in (axis_in, axis_out or axis_in):
         if axis not in AXES:
             raise ArgumentError(f"axis {axis!r} is not known; use one of {AXES}")
-    if hold not in (None, "included", "removed"):
+    if hold not in ("included", "removed"):
         raise ArgumentError(f"hold = {hold!r} is not known; use 'included' or 'removed'")
     at = replace(
         table,
@@ -112,8 +108,6 @@ def linear_response(
         hold=timing.hold,
         late=timing.late,
     )
-    if hold is None:
-        hold = "removed" if at.mode == "P" else "included"
     return response if hold == "included" else np.asarray(response / hold_response(f, fs=fs))
 
 
@@ -124,7 +118,7 @@ def exact_bandwidth(
     mode: CommandMode | None = None,
     operating_point: TablePosition | None = None,
     fs: float = 1000.0,
-    hold: Hold | None = None,
+    hold: Hold = "removed",
 ) -> float:
     """Frequency in Hz at which an axis lags its command by 90°, friction off.
 

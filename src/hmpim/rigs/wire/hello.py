@@ -45,7 +45,7 @@ class Hello:
         Of each axis, in its unit.
     watchdog : float or None
         Silence in s after which the far end brakes.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the position in force does between samples.
     source : str
         What it is, for people.

@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 from hmpim.errors import FormatError
 from hmpim.formats.readers.text.headings import Heading
@@ -37,7 +38,7 @@ class Notes:
         Nominal rate in Hz.
     band : tuple of float or None
         Excited band in Hz.
-    intersample : {'zoh', 'foh', 'bandlimited'} or None
+    intersample : {'zoh', 'foh', 'bandlimited', 'feedforward'} or None
         What the inputs do between samples.
     source : str
         Where the record comes from.
@@ -97,7 +98,7 @@ def _checked(noted: object, headings: Sequence[Heading]) -> Notes | None:
     pairs = {
         kind: [(str(c["name"]), str(c["unit"])) for c in noted.get(kind, [])] for kind in KINDS
     }
-    if noted["intersample"] not in (None, "zoh", "foh", "bandlimited", "sampled"):
+    if noted["intersample"] not in (None, *get_args(Intersample)):
         raise ValueError(f"intersample {noted['intersample']!r}")
     band = None
     if noted["band"] is not None:

@@ -1,0 +1,130 @@
+"""Zeros in front of the hold: rows against simulation, derivatives against differences."""
+
+import numpy as np
+import pytest
+
+import hmpim
+from hmpim.errors import ArgumentError
+from hmpim.identify.fitting.feedforward_rows import FeedforwardPart
+from hmpim.identify.fitting.rows import Part, Problem
+from hmpim.identify.fitting.sampled_rows import part_of
+from hmpim.model.dynamics import STRUCTURES
+from hmpim.model.sampled import prepare_input
+
+FS, SAMPLES = 500.0, 2500
+TIME = np.arange(SAMPLES) / FS
+W = 2 * np.pi * 25.0
+SERVO = {
+    "delay": 0.0031,
+    "scale_factor": 1.02,
+    "denominator": (0.002 / W**2, 1 / W**2 + 0.0028 / W, 1.4 / W + 0.002, 1.0),
+}
+"""Third order: a mode at 25 Hz of ζ 0.7, and a lag of 2 ms."""
+VELOCITY = (1.2 / W, 1.0)
+ACCELERATION = (0.8 / W**2, 1.2 / W, 1.0)
+
+
+def sweep():
+    fade = np.clip(np.minimum(TIME, TIME[-1] - TIME) / 0.2, 0.0, 1.0)
+    frequency = 0.5 + 11.0 * TIME
+    return (
+        np.sin(0.5 * np.pi * fade) ** 2
+        * np.sin(2 * np.pi * (0.5 * TIME + 5.5 * TIME**2))
+        / (1.0 + frequency / 12.0)
+    )
+
+
+def record(numerator, between, seed, *, stated=None, noise=1e-3):
+    model = hmpim.Model(numerator=numerator, **SERVO)
+    y = hmpim.simulate(model, sweep(), fs=FS, intersample=between)
+    y += 0.1 + noise * np.random.default_rng(seed).standard_normal(SAMPLES)
+    return hmpim.Record.from_arrays({"u": sweep()}, {"y": y}, fs=FS, intersample=stated)
+
+
+def problem():
+    source = prepare_input(sweep() + 0.3, "feedforward")
+    return Problem(source=source, y=np.zeros(SAMPLES), valid=None, longest_delay=99.0)
+
+
+@pytest.mark.parametrize("name", ["second_order_zero", "third_order_zero", "third_order_zeros"])
+def test_slopes_are_those_of_the_rows(name):
+    structure = STRUCTURES[name]
+    theta = np.array([1.4, np.log(4.0), 0.5, np.log(1.5)])[: 1 + structure.order]
+    numerator = np.array([1.1, 3.0, 9.0])[: structure.zeros + 1]
+    part = part_of(problem(), structure, theta)
+    assert isinstance(part, FeedforwardPart)
+    slopes = part.slopes(numerator, np.zeros(0))
+    some = part.slopes(numerator, np.zeros(0), slice(700, 950))
+    assert np.allclose(some, slopes[:, 700:950], rtol=0.0, atol=1e-12)
+    for i, slope in enumerate(slopes):
+        step = 1e-5 * np.eye(theta.size)[i]
+        up, down = (
+            part_of(problem(), structure, theta + sign * step).driven(numerator)
+            for sign in (1.0, -1.0)
+        )
+        expected = (up - down) / 2e-5
+        # A held input changes at once: a sample that the delay moves over is no derivative.
+        assert np.max(np.abs(slope - expected)) < 1e-5 * np.max(np.abs(expected))
+
+
+def test_without_zeros_a_command_is_held_alone():
+    part = part_of(problem(), STRUCTURES["third_order"], np.array([1.4, 1.2, 0.5, 0.3]))
+    assert type(part) is Part
+
+
+@pytest.mark.parametrize("numerator", [VELOCITY, ACCELERATION])
+@pytest.mark.parametrize("stated", [None, "feedforward"])
+def test_a_servo_with_feedforward_is_found(numerator, stated):
+    pair = hmpim.identify(record(numerator, "feedforward", 3, stated=stated, noise=1e-4)).pairs[0]
+    assert pair.intersample == "feedforward"
+    # Two modes behind the hold would have much the same samples.
+    assert pair.verdict == "ok" or stated is None
+    assert len(pair.numerator) == len(numerator)
+    for name, truth in {"delay": 0.0031, "natural_frequency": 25.0, "damping_ratio": 0.7}.items():
+        found = getattr(pair, name)
+        assert abs(found.value - truth) < 4.0 * found.spread
+    assert pair.noise_std.value == pytest.approx(1e-4, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_zeros_behind_the_hold_stay_there(seed):
+    pair = hmpim.identify(record(ACCELERATION, "zoh", seed)).pairs[0]
+    assert pair.intersample in ("zoh", "foh")  # half a sample of delay apart
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("stated", [None, "feedforward"])
+def test_error_bars_are_the_scatter(stated):
+    _check_coverage(range(100), stated)
+
+
+def test_error_bars_are_the_scatter_of_a_few():
+    _check_coverage(range(12), "feedforward")
+
+
+def _check_coverage(seeds, stated):
+    truth = {"delay": 0.0031, "natural_frequency": 25.0, "damping_ratio": 0.7, "scale_factor": 1.02}
+    inside = []
+    for seed in seeds:
+        given = record(ACCELERATION, "feedforward", seed, stated=stated, noise=1e-4)
+        pair = hmpim.identify(given).pairs[0]
+        assert pair.intersample == "feedforward"
+        for name, value in truth.items():
+            low, high = getattr(pair, name).ci95
+            inside.append(low <= value <= high)
+    assert np.mean(inside) > 0.95 - 4.0 * np.sqrt(0.05 * 0.95 / len(seeds))
+
+
+def test_the_model_predicts_as_it_was_fitted():
+    whole = record(ACCELERATION, "feedforward", 5, noise=1e-6)
+    pair = hmpim.identify(whole).pairs[0]
+    assert pair.intersample == "feedforward"
+    predicted = hmpim.predict(pair, whole)
+    assert np.std(predicted.predicted - whole.outputs[0].values) < 2e-6
+
+
+@pytest.mark.parametrize("name", ["washout", "four_modes", "second_order_zeros"])
+def test_zeros_that_feedforward_does_not_make_are_refused(name):
+    given = record(ACCELERATION, "feedforward", 1)
+    with pytest.raises(ArgumentError, match=f"'{name}' has zeros that feedforward does not make"):
+        hmpim.identify(given, structures=[name], intersample="feedforward")
