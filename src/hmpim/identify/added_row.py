@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 
 from hmpim.identify.arrays import Real, count_alike
-from hmpim.identify.chance import CLEARLY, LIKELIER
+from hmpim.identify.chance import CLEARLY, LIKELIER, ONE_SIDED
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
@@ -18,6 +18,7 @@ from hmpim.identify.fitting.course import Course, completed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.growth import hidden_pole
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
@@ -76,7 +77,7 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
 
     It is tried if the likeliest kind by its trace leaves white noise or explains most of the
     residual, or is friction, whose trace does not show where the unit sticks. None otherwise, also
-    if it may be a speed limit, which has no row, and where linear dynamics are clearly missing.
+    if it may be a speed limit, which has no row, and where linear dynamics are missing.
     """
     if spans_record(course.best) or is_poor(course.best, course.problem.spread):
         return None
@@ -92,7 +93,11 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
         return None
     plainly = replace(question, structures=question.plain)
     fitted = add_row(plainly, seen, OutputFit(fits=(joint,), begun=course))
-    return None if fitted.bending is None else fitted
+    if fitted.bending is None:
+        return None
+    (bent,) = fitted.fits
+    missed = hidden_pole(bent.problem, bent.best.fit)
+    return fitted if abs(missed.squared) < ONE_SIDED * missed.std else None
 
 
 def fit_with_row(
