@@ -280,7 +280,6 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
     known_between = course.alone or course.shared or not course.data.keeps_samples
     if known_between or leading.fit.structure.name in PLAIN:
         return []
-    most = TWICE * leading.fit.objective
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
     found = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
@@ -289,6 +288,6 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", hopeless=most)
+        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", iterations=40)
         found.append(trial_of("feedforward", fit, count))
     return found
