@@ -69,7 +69,7 @@ def test_a_numerator_without_derivatives_is_that_of_a_held_command():
 
 def test_a_command_has_two_derivatives():
     source = prepare_input(sweep(), "feedforward")
-    with pytest.raises(ArgumentError, match="degree 3 is not one of a command with feedforward"):
+    with pytest.raises(ArgumentError, match="degree 3 is given; a command with feedforward"):
         rational_response(
             source, delay=0.0, numerator=np.ones(4), denominator=np.array([1.0, 3.0, 3.0, 1.0])
         )

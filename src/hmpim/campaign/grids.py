@@ -40,10 +40,8 @@ _LABELS = {words.name: words.label for words in GLOSSARY}
 _INLINE = {words.name: words.inline for words in GLOSSARY}
 
 _READING = (
-    "−90° is that of the fitted model. Where the record states that its input is held (mode P, "
-    "position commands alone), it is without the hold; elsewhere it is that of the sampled "
-    "response, hold included. −90° of the response is the same frequency, read off the measured "
-    "response"
+    "−90° is that of the fitted model behind the hold, in every mode. −90° of the response is the "
+    "same frequency, read off the measured response"
 )
 _DOUBTFUL = "A ? marks a doubtful figure; the others of its row are reliable"
 _SIDES = "−a +b states how far a 95 % interval that is not symmetric reaches to either side"

@@ -237,8 +237,8 @@ def is_exact_between(system: RationalDelay, intersample: Intersample) -> bool:
 def fed_forward_response(system: RationalDelay, frequency: _Real, *, fs: float) -> _Complex:
     """Response from samples to samples if B(s) acts on a command before it is held.
 
-    Velocity and acceleration of the command are then held too, and only 1/A(s) and the delay, 0 or
-    more, are behind the hold.
+    Velocity and acceleration of the command are then held too, and only 1/A(s) and the delay are
+    behind the hold.
 
     Parameters
     ----------
@@ -253,6 +253,11 @@ def fed_forward_response(system: RationalDelay, frequency: _Real, *, fs: float) 
     -------
     complex ndarray, shape (m,)
     """
+    if system.numerator.size > 3:
+        raise ArgumentError(
+            f"a numerator of degree {system.numerator.size - 1} is given; a command with "
+            "feedforward has velocity and acceleration only, so give degree 2 at most"
+        )
     behind = discretise(replace(system, numerator=np.ones(1)), fs=fs, intersample="zoh")
     before = np.polynomial.polynomial.polyval(system.variable(frequency), system.numerator)
     return np.asarray(before * behind.response(frequency))

@@ -63,7 +63,7 @@ _DEGREE: dict[Intersample, int] = {
     "sampled": SAMPLES_ALONE,
 }
 
-_RATES = (
+_SPLINE_DERIVATIVES = (
     np.array([1.0, 10.0, 0.0, -10.0, -1.0]) / 24.0,
     np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6.0,
 )
@@ -98,7 +98,7 @@ class SampledInput:
     derivatives: NDArray[np.float64] | None = None
 
     def combined(self, numerator: NDArray[np.float64]) -> "SampledInput":
-        """The input to 1/A(s), of B(s)/A(s) with derivatives that are held too.
+        """Return B(s) of the command, its derivatives held too: the input to 1/A(s).
 
         Parameters
         ----------
@@ -107,8 +107,8 @@ class SampledInput:
         """
         if self.derivatives is None or numerator.size > 1 + len(self.derivatives):
             raise ArgumentError(
-                f"numerator of degree {numerator.size - 1} is not one of a command with "
-                "feedforward, which has velocity and acceleration; give one of degree 2 at most"
+                f"a numerator of degree {numerator.size - 1} is given; a command with "
+                "feedforward has velocity and acceleration only, so give degree 2 at most"
             )
         every = np.concatenate([self.coefficients[None], self.derivatives])
         whole = np.tensordot(numerator, every[: numerator.size], 1)
@@ -165,25 +165,25 @@ def prepare_input(
         degree=_DEGREE[intersample],
         oversampling=oversampling,
         samples=u.shape[-1],
-        derivatives=_rates(u, precision) if intersample == "feedforward" else None,
+        derivatives=_derivatives(u, precision) if intersample == "feedforward" else None,
     )
 
 
-def _rates(u: NDArray[np.float64], precision: float) -> NDArray[np.float64]:
+def _derivatives(u: NDArray[np.float64], precision: float) -> NDArray[np.float64]:
     """Velocity and acceleration of a band-limited input at its samples; 0 before and after them.
 
-    Where a spline misses a share x⁶ of the input, it misses about x⁴ of the acceleration, which
-    may be most of what a servo is commanded.
+    Where a spline misses a share x⁶ of the input, it misses about x⁴ of the acceleration: x⁴ ≤ p
+    needs x⁶ ≤ p^1.5, and the square is on the safe side.
     """
     smooth = prepare_input(u, "bandlimited", rest=False, precision=precision**2)
     factor = smooth.oversampling
     here = slice(MARGIN * factor, (MARGIN + smooth.samples) * factor, factor)
-    rates = [
+    found = [
         factor**order * scipy.ndimage.convolve1d(smooth.coefficients, weights)[..., here]
-        for order, weights in enumerate(_RATES, start=1)
+        for order, weights in enumerate(_SPLINE_DERIVATIVES, start=1)
     ]
     around = [(0, 0)] * u.ndim + [(MARGIN, MARGIN)]
-    return np.pad(np.stack(rates), around)
+    return np.pad(np.stack(found), around)
 
 
 def _continued(deviation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -66,7 +66,8 @@ class Aligned:
         'gaps', 'jitter', 'even_samples', 'rate', 'resampled'. Empty if nothing.
     intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'} or None
         What the inputs do between the samples here: as the record states, but 'bandlimited'
-        where a held or linear one has its corners by a clock of its own.
+        where a held or linear one has its corners by a clock of its own, and 'zoh' for
+        'feedforward' on a clock of its own.
     waveforms : tuple of Waveform
         What the inputs truly were, where that is so; empty else.
     """
@@ -186,9 +187,9 @@ def uniform(record: Record) -> Aligned:
     else:
         grid = _common_grid(channels, clocks, clock)
         findings.extend(_clock_differences(record, clocks, clock))
-    # Derivatives of a command are held at its own samples.
-    fed = record.intersample == "feedforward" and not shared
-    between = "zoh" if fed else record.intersample
+    # The output's clock does not keep a command's own samples, so its derivatives are unknown.
+    unknown = record.intersample == "feedforward" and not shared
+    between = "zoh" if unknown else record.intersample
     waveforms: tuple[Waveform, ...] = ()
     if (between == "zoh" or between == "foh") and switches_beside(
         record.inputs, clocks, clock, between

@@ -283,7 +283,7 @@ def _filled(
     after = np.clip(np.searchsorted(time, at), 1, time.size - 1)
     before = after - 1
     t0, t1, v0, v1 = time[before], time[after], values[before], values[after]
-    if intersample in ("zoh", "feedforward"):
+    if intersample == "zoh":  # not where derivatives are taken
         return np.asarray(v0)
     chord = (v1 - v0) / (t1 - t0)
     slope = np.diff(values) / np.diff(time)

@@ -1,5 +1,7 @@
 """Zeros in front of the hold: rows against simulation, derivatives against differences."""
 
+import runpy
+
 import numpy as np
 import pytest
 
@@ -128,3 +130,46 @@ def test_zeros_that_feedforward_does_not_make_are_refused(name):
     given = record(ACCELERATION, "feedforward", 1)
     with pytest.raises(ArgumentError, match=f"'{name}' has zeros that feedforward does not make"):
         hmpim.identify(given, structures=[name], intersample="feedforward")
+
+
+def test_a_gap_in_the_command_spoils_no_sample_before_it():
+    whole = record(ACCELERATION, "feedforward", 2, noise=1e-5)
+    kept = np.ones(SAMPLES, dtype=bool)
+    kept[605:625] = False
+    u, y = whole.inputs[0].values[kept], whole.outputs[0].values[kept]
+    given = hmpim.Record.from_arrays(
+        {"u": u}, {"y": y}, time=TIME[kept], fs=FS, intersample="feedforward"
+    )
+    pair = hmpim.identify(given).pairs[0]
+    assert pair.noise_std.value == pytest.approx(1e-5, rel=0.1)
+    assert abs(pair.delay.value - 0.0031) < 4.0 * pair.delay.spread
+
+
+def test_a_command_on_a_clock_of_its_own_is_held_alone():
+    model = hmpim.Model(numerator=VELOCITY, **SERVO)
+    fine = np.arange(2 * SAMPLES) / (2 * FS)
+    y = hmpim.simulate(model, np.repeat(sweep(), 2), fs=2 * FS, intersample="zoh")
+    given = hmpim.Record(
+        inputs=(hmpim.Channel(name="u", time=TIME, values=sweep()),),
+        outputs=(hmpim.Channel(name="y", time=fine, values=y + 1e-3),),
+        fs=2 * FS,
+        intersample="feedforward",
+    )
+    assert hmpim.identify(given).pairs[0].intersample == "zoh"
+
+
+def test_statistics_take_the_command_as_held():
+    pair = hmpim.identify(hmpim.compress(record(VELOCITY, "feedforward", 2), lags=300)).pairs[0]
+    assert pair.intersample != "feedforward"
+
+
+@pytest.mark.parametrize("target", ["scipy", "python"])
+def test_exported_programs_play_the_model(target, tmp_path):
+    given = record(ACCELERATION, "feedforward", 4, stated="feedforward", noise=1e-4)
+    result = hmpim.identify(given)
+    (path,) = hmpim.export(result, to=target, path=tmp_path / "servo.py")
+    simulate = runpy.run_path(str(path))["simulate"]
+    played = simulate(sweep(), TIME) if target == "scipy" else simulate(sweep())
+    wanted = hmpim.predict(result.pairs[0], given).predicted
+    allowed = 0.05 if target == "scipy" else 1e-4  # a script knows the held command alone
+    assert np.std(played - wanted) < allowed * np.std(wanted)

@@ -64,8 +64,8 @@ def refined_words(source: Source) -> str:
     aliased = ""
     if source.intersample == "feedforward" and source.model.system.numerator.size > 1:
         aliased = (
-            f" Velocity and acceleration commands that are held too change its response by up to "
-            f"{_missed_commands(source, f):.1e} up to {f:.4g} Hz."
+            " It neglects that velocity and acceleration commands are held too: an error of up to "
+            f"{_error_without_held_derivatives(source, f):.1e} of the response up to {f:.4g} Hz."
         )
     return (
         f"simulate: for a {kind} input, the delay is right to 1/{2 * REFINE} of a sample; "
@@ -73,7 +73,7 @@ def refined_words(source: Source) -> str:
     )
 
 
-def _missed_commands(source: Source, highest: float) -> float:
+def _error_without_held_derivatives(source: Source, highest: float) -> float:
     """Relative difference between derivatives of a held command, and held derivatives of it."""
     frequency = highest * np.arange(1, 201) / 200
     system = source.causal().system
@@ -107,7 +107,7 @@ def refined_values(source: Source) -> dict[str, Any]:
         "high": model.saturation_high,
         "hold_period": model.hold_period,
         "quantum": model.quantization_step,
-        "intersample": source.intersample,
+        "intersample": "zoh" if is_held(source.intersample) else source.intersample,
         "fs": source.fs,
         "refine": REFINE,
         "frequency": seen.frequency,

@@ -407,7 +407,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     late = likeness(inputs[pairs.strong[0]], contribution(best), pairs.y.size // 2 - 1).lag
     others = [inputs[j] for j in weak]
     whitening = whitening_of(rest, others, late=late)
-    mode = "zoh" if is_held(mode) else mode  # feedforward acts on the servo of its own axis
+    mode = "zoh" if is_held(mode) else mode  # a coupling receives no feedforward
     modes = {j: pairs.between.get(j, mode) for j in weak}
     sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures

@@ -22,7 +22,7 @@ from hmpim.identify.fitting.enrich import (
 )
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
-from hmpim.identify.fitting.held_steps import jumps, steps_through
+from hmpim.identify.fitting.held_steps import is_all_behind_hold, steps_through
 from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly
@@ -402,7 +402,7 @@ def in_best_sample(problem: Problem, best: Fit) -> Fit:
 
     Only where the delay is confined to one sample.
     """
-    if not steps_through(best.structure, held=jumps(problem.source, best.structure)):
+    if not steps_through(best.structure, held=is_all_behind_hold(problem.source, best.structure)):
         return best
     for step in (-1.0, 1.0):
         while True:

@@ -15,7 +15,8 @@ __all__ = ["FeedforwardPart", "is_fed_forward", "may_be_fed_forward"]
 def may_be_fed_forward(structure: Structure) -> bool:
     """Whether zeros of a structure may stem from commands of velocity and acceleration.
 
-    Modes in parallel have zeros of their own, and a servo does not follow at once.
+    Sections in parallel have zeros of other origin, and with as many zeros as poles the output
+    would jump.
     """
     return structure.order > structure.zeros > structure.dc_zeros == 0 and not structure.parallel
 

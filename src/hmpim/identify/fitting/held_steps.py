@@ -19,7 +19,7 @@ from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.sampled import SampledInput, companion
 
-__all__ = ["at_ends", "in_whole_samples", "jumps", "kept_in_sample", "steps_through"]
+__all__ = ["at_ends", "in_whole_samples", "is_all_behind_hold", "kept_in_sample", "steps_through"]
 
 _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
@@ -32,8 +32,8 @@ _FORGOTTEN = 1e-10
 """Share of a state that remains after part of a sample, below which it is unobservable."""
 
 
-def jumps(source: SampledInput, structure: Structure) -> bool:
-    """Whether an input that stands still and jumps is what the dynamics see."""
+def is_all_behind_hold(source: SampledInput, structure: Structure) -> bool:
+    """Whether all of B(s)/A(s) is behind the hold of a held input."""
     return source.degree == 0 and not is_fed_forward(source, structure)
 
 
@@ -57,7 +57,7 @@ def in_whole_samples(structure: Structure, *, held: bool) -> bool:
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:
     """The problem with the delay kept in its sample, in the middle if no fraction is known."""
-    held = jumps(problem.source, structure)
+    held = is_all_behind_hold(problem.source, structure)
     stated = problem.shortest_delay == problem.longest_delay
     if stated or not steps_through(structure, held=held):
         return problem

@@ -78,7 +78,7 @@ def joint_fit(
         forgotten filled-in samples. All if None.
     intersample : {'zoh', 'foh', 'bandlimited', 'feedforward', 'sampled'}, optional
         The input between samples, or 'sampled' for software, whose structures are filters; chosen
-        by likelihood among the first three if None.
+        by likelihood if None, 'feedforward' only with one input.
     structures : tuple of str
         Structures to try.
     nuisance : ndarray, shape (k, n), optional
@@ -183,8 +183,10 @@ def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
     count = problem.counted * joint.weighed_share
     fit = polished(problem, leading.fit)
     trials = [trial for trial in joint.trials if trial is not leading]
-    fed: tuple[Intersample, ...] = ("feedforward",) if may_be_fed_forward(fit.structure) else ()
-    for other in () if course.alone else (*BETWEEN, *fed):
+    others = () if course.alone else BETWEEN
+    if _tries_feedforward(course) and may_be_fed_forward(fit.structure):
+        others = (*others, "feedforward")
+    for other in others:
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
             trials.append(trial_of(other, moved, count))
@@ -275,10 +277,12 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
 
 
 def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
-    """The trials of servos with zeros, with velocity and acceleration held too, if zeros lead."""
-    leading = min(trials, key=lambda trial: trial.criterion)
-    known_between = course.alone or course.shared or not course.data.keeps_samples
-    if known_between or leading.fit.structure.name in PLAIN:
+    """Fit each servo structure with its zeros in front of the hold, if zeros lead.
+
+    Otherwise they would only explain the ends of the record.
+    """
+    leading = min(trials, key=lambda trial: trial.criterion).fit.structure
+    if not _tries_feedforward(course) or leading.zeros == leading.dc_zeros:
         return []
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
     found = []
@@ -291,3 +295,8 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
         fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", iterations=40)
         found.append(trial_of("feedforward", fit, count))
     return found
+
+
+def _tries_feedforward(course: Course) -> bool:
+    """Whether zeros may turn out to act before the hold; with several inputs only if stated."""
+    return not (course.alone or course.shared) and course.data.keeps_samples

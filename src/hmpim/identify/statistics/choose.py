@@ -135,8 +135,6 @@ def choose(
     """
     conditioned = _is_conditioned(statistics)
     names = tuple(name for name in structures if name not in INTEGRATING)
-    if intersample == "feedforward":
-        intersample = "zoh"  # the derivatives' aliases need samples
     natural: Intersample = intersample or ("zoh" if _looks_held(statistics) else "bandlimited")
     data = CompressedData.of(statistics, skipped=statistics.lags if conditioned else 0)
     course = begun(data, natural, names, _ALL)

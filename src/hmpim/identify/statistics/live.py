@@ -113,7 +113,7 @@ class LiveEstimator:
         check_argument("window", window, float)
         check_argument("intersample", intersample, Intersample)
         if intersample == "feedforward":
-            intersample = "zoh"  # the derivatives' aliases need samples
+            intersample = "zoh"  # the statistics hold no derivatives of the command
         lags = round(window * stimulus.fs)
         if lags < 8:
             raise ArgumentError(

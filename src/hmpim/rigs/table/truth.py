@@ -19,8 +19,7 @@ ComplexArray = NDArray[np.complex128]
 Hold = Literal["included", "removed"]
 """Whether a response contains what holding the command between its samples does.
 
-Commands are held, those of velocity and acceleration too. A fit that knows it, as the record states
-it, finds the table behind the hold.
+All commands are held. A fit to a record that states this finds the table behind the hold.
 """
 
 _GRID = 0.25  # Hz; the phase turns by a few degrees at most in between
