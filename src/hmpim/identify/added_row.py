@@ -75,9 +75,9 @@ def add_row(question: Question, seen: Imperfections, fitted: OutputFit) -> Outpu
 def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputFit | None:
     """Plain dynamics with a nonlinearity that likely explains the residual, if that leaves noise.
 
-    It is tried if the likeliest kind by its trace leaves white noise or explains most of the
-    residual, or is friction, whose trace does not show where the unit sticks. None otherwise, also
-    if it may be a speed limit, which has no row, and where linear dynamics are missing.
+    It is tried if the trace of the likeliest kind leaves white noise or explains most of the
+    residual, or if that kind is friction, whose trace does not show where the unit sticks. None
+    for a possible speed limit, which has no row, and if linear dynamics are missing.
     """
     if spans_record(course.best) or is_poor(course.best, course.problem.spread):
         return None

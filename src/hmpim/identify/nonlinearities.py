@@ -25,8 +25,8 @@ __all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends
 def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, OutputFit]:
     """Fit an output as `hmpim.identify.fits.fit`, first with a nonlinearity.
 
-    With a single input only if one likely explains the residual of plain dynamics. The levels found
-    are returned with the fit.
+    With a single input, a nonlinearity is tried first only if it likely explains the residual of
+    plain dynamics. The levels found are returned with the fit.
     """
     if not _may_bend(question):
         return fit(question, seen)

@@ -172,7 +172,7 @@ class _Search:
     def _compared(self, suspect: _Suspect) -> tuple[OutputFit, OutputFit]:
         """Fits to the record as it is, and without the suspect samples.
 
-        Of the output, these are first left out and then added: they may hide the response.
+        Samples of the output are left out first and then added: they may hide the response.
         """
         again = _fitted(suspect.question, self.seen)
         if suspect.question.aligned is self.question.aligned:

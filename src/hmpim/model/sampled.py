@@ -1,7 +1,7 @@
 """Exact response of a rational system with delay to an input known at its samples only.
 
-What the input does between its samples is one of three assumptions, and each is a
-cardinal B-spline: held (degree 0), linear (degree 1), and band-limited, taken as the
+What the input does between its samples is one of three assumptions (a held command may have
+held derivatives too), and each is a cardinal B-spline: held (degree 0), linear (degree 1), and band-limited, taken as the
 spline of degree 5, which interpolates a band-limited signal with a relative error of
 about 2 (f / (fs - f))^6 (Unser, Splines: a perfect fit for signal and image processing,
 IEEE Signal Processing Magazine, 1999, eq. 12). An input with content nearer to the Nyquist

@@ -69,12 +69,12 @@ def fit_plain(
     structures: tuple[StructureName, ...],
     *,
     before: Sequence[Fit] = (),
-    useless: float = np.inf,
+    largest: float = np.inf,
 ) -> list[Fit]:
     """Fit each structure, the richest first, from its own starts and then from the simpler ones.
 
     The first start of a structure is where its fit ended `before`, on other samples, if any. A fit
-    that promises a sum of squares above `useless` is given up.
+    that promises a sum of squares above `largest` is given up.
     Once a residual is white no other start is needed, and simpler structures that promise much
     more than its sum of squares are hopeless: they get one start, and only promising steps.
     """
@@ -88,13 +88,13 @@ def fit_plain(
             known = [fit.theta for fit in before if fit.structure == structure]
             starts = known or starting_values(rough, structure, thorough=False)
         hopeful = min((f.objective for f in fits), default=np.inf) * TWICE
-        hopeless = min(TWICE * hopeful if settled else np.inf, useless)
+        hopeless = min(TWICE * hopeful if settled else np.inf, largest)
         fit = fit_structure(problem, structure, starts[0], iterations=TASTE, hopeless=hopeless)
         # Where noise is most of the output, the residual is white whatever the model misses.
         noisy = fit.cost > MOST * problem.spread
         white = fit.objective < hopeful and fit.is_white
         if noisy:
-            fit = _tasted(problem, searched(rough, structure), fit, useless)
+            fit = _tasted(problem, searched(rough, structure), fit, largest)
         if not white and fit.objective < TWICE**2 * hopeful:
             rivals = starts[1:]
             if not settled and structure.order and problem.begins is not None:
@@ -104,11 +104,11 @@ def fit_plain(
             elif not settled and structure.order:
                 every = np.stack([*starts, *starting_values(rough, structure)])
                 rivals = list(fitted_roughly(condensed(rough), structure, every).likely)
-            fit = _tasted(problem, rivals, fit, useless)
+            fit = _tasted(problem, rivals, fit, largest)
             # Where the output is ahead, the record lacks the beginning as well.
             underway = problem.begins is not None or fit.delay < STAMPED_LATE
             if not settled and structure.order and underway and not fit.is_white:
-                fit = _tasted(problem, _slipped(rough, fit.theta), fit, useless)
+                fit = _tasted(problem, _slipped(rough, fit.theta), fit, largest)
         settled = settled or white
         fits.append(fit)
     at = {fit.structure.name: i for i, fit in enumerate(fits)}
@@ -121,7 +121,7 @@ def fit_plain(
 
     def ended(fit: Fit) -> Fit:
         if fit.objective <= TWICE**2 * least:
-            limits = {"precision": _PRECISION / fit.share, "hopeless": useless}
+            limits = {"precision": _PRECISION / fit.share, "hopeless": largest}
             return fit if fit.converged else refit(problem, fit, **limits)
         if not fit.prediction.size:
             return fit
@@ -130,10 +130,10 @@ def fit_plain(
     return [ended(fit) for fit in fits]
 
 
-def _tasted(problem: Problem, starts: Sequence[Real], best: Fit, useless: float) -> Fit:
+def _tasted(problem: Problem, starts: Sequence[Real], best: Fit, largest: float) -> Fit:
     """The best of a fit and of a few steps from each other promising start."""
     for theta in starts:
-        hopeless = min(TWICE * best.objective, useless)
+        hopeless = min(TWICE * best.objective, largest)
         rival = fit_structure(problem, best.structure, theta, iterations=TASTE, hopeless=hopeless)
         best = min(best, rival, key=lambda fit: fit.objective)
     return best
@@ -255,8 +255,8 @@ def fit_integrating(
     """
     found: list[Fit] = []
     for structure in members(structures, INTEGRATING):
-        useless = bool(found) and found[-1].objective > NEARLY * problem.spread
-        if useless or sums_to_noise([*fits, *found]):
+        largest = bool(found) and found[-1].objective > NEARLY * problem.spread
+        if largest or sums_to_noise([*fits, *found]):
             break
         if any(fit.structure == structure for fit in fits):
             continue

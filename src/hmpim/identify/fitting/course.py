@@ -171,7 +171,7 @@ def turn_ahead(course: Course) -> Course:
     if count < PART * level.size:
         return course
     problem, power = ahead.problem(course.natural, shorter), best.objective / course.problem.counted
-    found = fit_plain(problem, rough, course.plain or PLAIN, useless=power * count)
+    found = fit_plain(problem, rough, course.plain or PLAIN, largest=power * count)
     if TWICE * min(f.objective for f in found) > power * count:
         return course
     return replace(course, data=ahead, given=shorter, counted=shorter, fits=found)
@@ -267,7 +267,7 @@ def _in_motion(course: Course) -> Counted | None:
         return None
     problem = data.problem(course.natural, begun)
     useless = course.best.objective / course.problem.counted * problem.counted
-    free = fit_plain(problem, data.rough, course.plain or PLAIN, useless=useless)
+    free = fit_plain(problem, data.rough, course.plain or PLAIN, largest=useless)
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
@@ -326,7 +326,8 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
     if not required and not any(fit.is_white for fit in richer):
         richer = []
     tried = [*fits, *richer]
-    if min(fit.objective for fit in tried) < TWICE * best.objective:  # else `mode` is not natural
+    # Otherwise the natural assumption is wrong, and its residual shows no tail.
+    if min(fit.objective for fit in tried) < TWICE * best.objective:
         richer = [*richer, *_with_tails(course, tried)]
     if not richer:
         return course, fitted
