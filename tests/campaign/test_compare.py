@@ -156,7 +156,7 @@ def test_page_says_how_to_read_it_and_why_a_verdict_is_not_ok(demo):
     study, folder = demo
     page = study_page(study)
     (cases,) = [grid for grid in page.grids if grid.caption.startswith("Every case")]
-    assert "without the hold" in cases.note
+    assert "behind the hold" in cases.note
     assert "without friction" in cases.note
     assert "Noise (deg)" in cases.columns
     assert "Load" not in cases.columns  # the usual one in every row

@@ -219,7 +219,7 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for the same rows."""
+        """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
         question, seen = self.question, self.seen
         if self.several or question.intersample == "sampled":
             return fit_once(question, seen, names, rows, excluded=self.unrelated)

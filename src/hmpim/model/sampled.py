@@ -1,11 +1,11 @@
 """Exact response of a rational system with delay to an input known at its samples only.
 
-What the input does between its samples is one of three assumptions (a held command may have
-held derivatives too), and each is a cardinal B-spline: held (degree 0), linear (degree 1), and band-limited, taken as the
-spline of degree 5, which interpolates a band-limited signal with a relative error of
-about 2 (f / (fs - f))^6 (Unser, Splines: a perfect fit for signal and image processing,
-IEEE Signal Processing Magazine, 1999, eq. 12). An input with content nearer to the Nyquist
-frequency is interpolated to a higher rate first.
+What the input does between its samples is one of three assumptions (of a held command,
+derivatives may be held too), and each is a cardinal B-spline: held (degree 0), linear
+(degree 1), and band-limited, taken as the spline of degree 5, which interpolates a band-limited
+signal with a relative error of about 2 (f / (fs - f))^6 (Unser, Splines: a perfect fit for signal
+and image processing, IEEE Signal Processing Magazine, 1999, eq. 12). An input with content nearer
+to the Nyquist frequency is interpolated to a higher rate first.
 
 A system 1/A(s) of order n answers one B-spline by a sequence that an n-th order difference
 equation continues; its first samples come from one matrix exponential (C. Van Loan,

@@ -255,8 +255,8 @@ def fit_integrating(
     """
     found: list[Fit] = []
     for structure in members(structures, INTEGRATING):
-        largest = bool(found) and found[-1].objective > NEARLY * problem.spread
-        if largest or sums_to_noise([*fits, *found]):
+        useless = bool(found) and found[-1].objective > NEARLY * problem.spread
+        if useless or sums_to_noise([*fits, *found]):
             break
         if any(fit.structure == structure for fit in fits):
             continue
