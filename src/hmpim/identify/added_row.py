@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 
 from hmpim.identify.arrays import Real, count_alike
-from hmpim.identify.chance import CLEARLY, LIKELIER, ONE_SIDED
+from hmpim.identify.chance import CLEARLY, DEVIATIONS, LIKELIER
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
@@ -97,7 +97,7 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
         return None
     (bent,) = fitted.fits
     missed = hidden_pole(bent.problem, bent.best.fit)
-    return fitted if abs(missed.squared) < ONE_SIDED * missed.std else None
+    return fitted if abs(missed.squared) < DEVIATIONS * missed.std else None
 
 
 def fit_with_row(
