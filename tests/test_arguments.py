@@ -303,7 +303,8 @@ def test_names_that_the_table_lacks_refuse_nonsense_too():
         ),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs=1.0, intersample="foo"),
-            "intersample = 'foo' is not one of 'zoh', 'foh', 'bandlimited', 'sampled' or None",
+            "intersample = 'foo' is not one of 'zoh', 'foh', 'bandlimited', 'feedforward', "
+            "'sampled' or None",
         ),
         (
             lambda: hmpim.Record.from_arrays([0, 1], [1, 2], fs=1.0, band=(5, 1)),
