@@ -23,6 +23,7 @@ from hmpim.model.causal import causal_filter
 from hmpim.model.filters import in_z
 from hmpim.model.fractions import modal_form
 from hmpim.model.response import RationalDelay, per_step, response
+from hmpim.model.sampled import check_fed_forward
 from hmpim.record import Intersample, is_held
 
 __all__ = [
@@ -253,11 +254,7 @@ def fed_forward_response(system: RationalDelay, frequency: _Real, *, fs: float) 
     -------
     complex ndarray, shape (m,)
     """
-    if system.numerator.size > 3:
-        raise ArgumentError(
-            f"a numerator of degree {system.numerator.size - 1} is given; a command with "
-            "feedforward has velocity and acceleration only, so give degree 2 at most"
-        )
+    check_fed_forward(system.numerator)
     behind = discretise(replace(system, numerator=np.ones(1)), fs=fs, intersample="zoh")
     before = np.polynomial.polynomial.polyval(system.variable(frequency), system.numerator)
     return np.asarray(before * behind.response(frequency))

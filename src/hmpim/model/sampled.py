@@ -32,6 +32,7 @@ __all__ = [
     "SAMPLES_ALONE",
     "WINDOW",
     "SampledInput",
+    "check_fed_forward",
     "companion",
     "delayed_response",
     "interpolation_error",
@@ -105,14 +106,26 @@ class SampledInput:
         numerator : ndarray, shape (1 to 3,)
             B by rising powers of s per sample.
         """
-        if self.derivatives is None or numerator.size > 1 + len(self.derivatives):
-            raise ArgumentError(
-                f"a numerator of degree {numerator.size - 1} is given; a command with "
-                "feedforward has velocity and acceleration only, so give degree 2 at most"
-            )
-        every = np.concatenate([self.coefficients[None], self.derivatives])
-        whole = np.tensordot(numerator, every[: numerator.size], 1)
-        return replace(self, coefficients=whole, derivatives=None)
+        check_fed_forward(numerator)
+        parts = zip(numerator, self.commands, strict=False)
+        whole = sum(weight * part.coefficients for weight, part in parts)
+        return replace(self, coefficients=np.asarray(whole), derivatives=None)
+
+    @property
+    def commands(self) -> tuple["SampledInput", ...]:
+        """The command, and its velocity and acceleration if these are held too, each alone."""
+        rates = () if self.derivatives is None else self.derivatives
+        every = (self.coefficients, *rates)
+        return tuple(replace(self, coefficients=c, derivatives=None) for c in every)
+
+
+def check_fed_forward(numerator: NDArray[np.float64]) -> None:
+    """Refuse a numerator that needs more derivatives than a command with feedforward has."""
+    if numerator.size > 1 + len(_SPLINE_DERIVATIVES):
+        raise ArgumentError(
+            f"a numerator of degree {numerator.size - 1} is given; a command with feedforward has "
+            "velocity and acceleration only, so give degree 2 at most"
+        )
 
 
 def prepare_input(

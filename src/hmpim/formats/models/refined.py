@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hmpim.formats.models.source import Source
-from hmpim.model.discrete import discretise, fed_forward_response
+from hmpim.model.discrete import discretise, fed_forward_response, is_exact_between
 from hmpim.model.fractions import modal_form
 from hmpim.model.response import per_step
 from hmpim.record import is_held
@@ -62,7 +62,7 @@ def refined_words(source: Source) -> str:
         )
     kind = "held" if is_held(source.intersample) else "linear"
     aliased = ""
-    if source.intersample == "feedforward" and source.model.system.numerator.size > 1:
+    if not is_exact_between(source.model.system, source.intersample):
         aliased = (
             " It neglects that velocity and acceleration commands are held too: an error of up to "
             f"{_error_without_held_derivatives(source, f):.1e} of the response up to {f:.4g} Hz."

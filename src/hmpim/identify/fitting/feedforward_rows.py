@@ -37,9 +37,8 @@ class FeedforwardPart(Part):
         self.structure, self.theta = structure, theta
         self._source, self._delay = problem.source, float(theta[0])
         self._poles = poles_of(structure, theta[1:])
-        powers = np.eye(structure.zeros + 1)
-        commands = [self._source.combined(powers[k, : k + 1]) for k in range(len(powers))]
-        self._each = [PoleResponses(one, self._delay, self._poles.upper) for one in commands]
+        commands, upper = self._source.commands[: structure.zeros + 1], self._poles.upper
+        self._each = [PoleResponses(command, self._delay, upper) for command in commands]
         self.rows = self._answered(self._poles.expand(np.ones((1, 1))))[:, 0]
         self.level = self._source.first
         self._begin(problem.begins)

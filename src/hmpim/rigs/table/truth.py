@@ -40,7 +40,7 @@ def linear_response(
 
     MuJoCo's derivatives of one step (`mjd_transitionFD`), with the servos closed around it, and
     command hold and transport delay summed exactly: samples of the true position over samples
-    of the command.
+    of the command, without the hold's own response unless `hold` is 'included'.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def exact_bandwidth(
     fs: float = 1000.0,
     hold: Hold = "removed",
 ) -> float:
-    """Frequency in Hz at which an axis lags its command by 90°, friction off.
+    """Frequency in Hz at which an axis lags its command by 90°, friction off; behind the hold.
 
     Parameters
     ----------
