@@ -13,6 +13,7 @@ from hmpim.identify.coupling.output_fit import (
     fit_in_motion,
     fit_leading,
     fit_together,
+    without_slow,
 )
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
@@ -35,7 +36,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import follows
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.joint import chosen_of, joint_fit
+from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
 from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
@@ -146,8 +147,7 @@ def _fit_and_look_for_rows(
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
     software = question.intersample == "sampled"
-    led = begun if isinstance(begun, tuple) else None
-    fit_drift = None if software else partial(_plain_beside_drift, question, seen, led)
+    fit_drift = None if software else partial(_plain_beside_drift, question, seen)
     fitted = fit_once(question, seen, question.structures, begun=begun, fit_drift=fit_drift)
     if fitted.drifting is not None or fitted.fits[0].silent:
         return fitted
@@ -222,7 +222,8 @@ class _WithRows:
         """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
         question, seen = self.question, self.seen
         if self.several or question.intersample == "sampled":
-            return fit_once(question, seen, names, rows, excluded=self.unrelated)
+            known = self.latest.led if self.several else None
+            return fit_once(question, seen, names, rows, begun=known, excluded=self.unrelated)
         if self.begun is None or not np.array_equal(self.begun[0], rows):
             self.begun = (
                 rows,
@@ -258,23 +259,23 @@ def _as_before(
     return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
-def _plain_beside_drift(
-    question: Question, seen: Imperfections, led: Led | None, asked: int, first: JointFit
-) -> OutputFit | None:
+def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `first` is the plain fit to the leading input, `asked`; `led` is what `lead` found, if known.
+    `led` are the plain fits with a constant bias.
     """
+    known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))
     freed: OutputFit | None = None
 
     def begun(rows: Real) -> tuple[Problem, Fit]:
-        joint = fit_once(question, seen, question.plain, rows, leading_only=True).fits[0]
+        plainly = partial(fit_once, question, seen, question.plain, begun=known)
+        joint = plainly(rows, leading_only=True).fits[0]
         return joint.problem, joint.best.fit
 
     def fitted(rows: Real) -> JointFit:
         nonlocal plain
-        plain = fit_once(question, seen, question.plain, rows)
+        plain = fit_once(question, seen, question.plain, rows, begun=known)
         return plain.fits[asked]
 
     def steadily(_: JointFit) -> JointFit | None:
@@ -360,15 +361,14 @@ def counted_in(question: Question, seen: Imperfections) -> Mask | None:
 
 def lead(question: Question, seen: Imperfections) -> Led:
     """Plain fit of the input that the output follows most, and its place."""
-    fitted = partial(
-        joint_fit,
+    likeliest = partial(
+        fit_likeliest,
         known=question.measured,
         intersample=question.intersample,
         structures=question.plain,
-        growing=False,
     )
     inputs, output = [source.values for source in question.aligned.inputs], question.output
-    return fit_leading(inputs, output.values, valid=counted_in(question, seen), fitted=fitted)
+    return fit_leading(inputs, output.values, valid=counted_in(question, seen), likeliest=likeliest)
 
 
 def fit_once(
@@ -384,8 +384,8 @@ def fit_once(
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
-    The search continues from `begun`, if it is known: the plain fits to a single input, or what
-    `lead` found of several. Inputs in `excluded` are not fitted; `fit_drift` and `leading_only` are
+    The search continues from `begun`, if it is known: the plain fits to a single input, or fits to
+    some of several. Inputs in `excluded` are not fitted; `fit_drift` and `leading_only` are
     as for `fit_together`.
     """
     if isinstance(begun, Course):

@@ -33,7 +33,8 @@ def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, 
     if len(question.aligned.inputs) == 1:
         return fit(question, seen, bent=partial(fit_bent, question, seen))
     led = lead(question, seen)
-    bent = fit_with_row(question, seen, *led)
+    ((leading, joint),) = led.items()
+    bent = fit_with_row(question, seen, leading, joint)
     return fit(question, seen, led) if bent is None else (seen, bent)
 
 

@@ -32,7 +32,7 @@ from hmpim.identify.fitting.course import Course, bridged
 from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
-from hmpim.identify.fitting.joint import joint_fit
+from hmpim.identify.fitting.joint import fit_likeliest, joint_fit
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.nonlinear.modelled import Modelled
@@ -43,10 +43,12 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
 
-__all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together"]
+__all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together", "without_slow"]
 
-Led = tuple[int, JointFit]
-"""The input that an output follows most, and its plain fit, as `fit_leading` returns them."""
+Led = Mapping[int, JointFit]
+"""Fits to inputs that move an output strongly, the strongest first."""
+
+_Likeliest = Callable[..., tuple[int, JointFit]]
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -84,9 +86,16 @@ class OutputFit:
     def slow(self) -> int | None:
         """An input whose fit may explain a drift; None without one."""
         for i, fit in enumerate(self.fits):
-            if fit.related and self.strong[i] and (spans_record(fit.best.fit) or fit.lingers):
+            if fit.related and self.strong[i] and not without_slow({i: fit}):
                 return i
         return None
+
+    @property
+    def led(self) -> Led:
+        """Fits to the strong inputs, the strongest first, except those that may explain a drift."""
+        known = [j for j, fit in enumerate(self.fits) if fit.related and self.strong[j]]
+        known.sort(key=lambda j: -float(np.std(contribution(self.fits[j]))))
+        return without_slow({j: self.fits[j] for j in known})
 
     @property
     def leading(self) -> int:
@@ -108,6 +117,11 @@ class OutputFit:
         return np.sum(trends, axis=0) if trends else None
 
 
+def without_slow(led: Led) -> Led:
+    """The fits that are not as slow as a drift."""
+    return {j: fit for j, fit in led.items() if not (spans_record(fit.best.fit) or fit.lingers)}
+
+
 def fit_together(
     inputs: list[Real],
     y: Real,
@@ -120,7 +134,7 @@ def fit_together(
     nuisance: Real | None = None,
     excluded: Mapping[int, JointFit],
     led: Led | None = None,
-    fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
+    fit_drift: Callable[[Led], OutputFit | None] | None = None,
     leading_only: bool = False,
 ) -> OutputFit:
     """Fit one output, (n,), to several inputs.
@@ -130,10 +144,10 @@ def fit_together(
     inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
     coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
     enter linearly, such as a drift's. Inputs `excluded` are left out; each has its unrelated fit.
-    `led` is the plain fit of the leading input to these samples, if it is known.
+    The search begins from the fits `led`, if they are known, which may have had other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
-    then fits plain dynamics with one, given the leading input and its plain fit, and its value is
+    then fits plain dynamics with one, given the plain fits to the strong inputs, and its value is
     returned unless it is None. If `leading_only`, only strong inputs are fitted, with plain
     dynamics, and only the leading input's fit is returned.
     """
@@ -143,15 +157,16 @@ def fit_together(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
-    i, leading = led or _lead(inputs, pairs, plainly)
-    pairs.put(i, leading)
-    pairs.strong.append(i)
+    leads = partial(fit_likeliest, known=known, intersample=intersample, nuisance=nuisance)
+    pairs.begin(led or _lead(inputs, pairs, partial(leads, structures=plain)), nuisance)
+    if led and leading_only:
+        _fit_strong(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
     if leading_only:
         pairs.refine(pairs.kept, None)
         return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
-        drifting = fit_drift(pairs.strong[0], pairs.fits[pairs.strong[0]])
+        drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong})
         if drifting is not None:
             return drifting
     richly = partial(fitted, structures=structures, shared=True)
@@ -174,26 +189,15 @@ def _fit_in_turns(
     for _ in range(_TURNS):
         before = pairs.structures
         _fit_strong(inputs, pairs, richly)
-        cost = pairs.cost
         pairs.refine(pairs.kept, None)
         clearer = pairs.cost * TWICE < least
         if clearer:
             _join(inputs, pairs, plainly)
             least = pairs.cost
-        others = pairs.structures != before
-        if others or clearer:
-            _fit_couplings(inputs, pairs, structures)
-            pairs.refine(pairs.kept, None)
-        if not others and pairs.cost * TWICE > cost:
+        if pairs.structures == before and not clearer:
             break  # otherwise each was fitted with wrong contributions of the others
-
-
-def fit_leading(
-    inputs: list[Real], y: Real, *, valid: Mask | None, fitted: Callable[..., JointFit]
-) -> Led:
-    """Fit the input that an output, (n,), follows most; the others count as noise."""
-    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=(), excluded={})
-    return _lead(inputs, pairs, fitted)
+        _fit_couplings(inputs, pairs, structures)
+        pairs.refine(pairs.kept, None)
 
 
 def fit_in_motion(
@@ -272,15 +276,19 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
 
 
-def _lead(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> Led:
+def fit_leading(inputs: list[Real], y: Real, *, valid: Mask | None, likeliest: _Likeliest) -> Led:
+    """Fit the input that an output, (n,), follows most; the others count as noise."""
+    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=(), excluded={})
+    return _lead(inputs, pairs, likeliest)
+
+
+def _lead(inputs: list[Real], pairs: Pairs, likeliest: _Likeliest) -> Led:
     """Fit the input that the output follows most."""
     level = bridged(pairs.y, pairs.valid)
     share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
-    likely = dict.fromkeys([*_likely(share), *_likely(sums)])  # each is fitted once only
-    tried = {j: fitted(inputs[j], pairs.y, valid=pairs.valid) for j in likely}
-    i = min(tried, key=lambda j: tried[j].best.fit.cost)
-    return i, tried[i]
+    likely = {j: inputs[j] for j in (*_likely(share), *_likely(sums))}
+    return dict([likeliest(likely, pairs.y, valid=pairs.valid)])
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:

@@ -83,6 +83,14 @@ class Pairs:
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
 
+    def begin(self, led: Mapping[int, JointFit], nuisance: Real | None) -> None:
+        """Start from known fits to strong inputs, with `nuisance`, (k, n), as their rows."""
+        for i, fit in led.items():
+            self.put(i, _with_nuisance(fit, nuisance))
+            self.strong.append(i)
+        if len(led) > 1 or any(self.fits[i] is not fit for i, fit in led.items()):
+            self.refine(self.kept, None)
+
     def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
         """Note the data of one input's full search; whether the last one had others."""
         before = self._searched.get(i)
@@ -167,6 +175,17 @@ class Pairs:
             return False
         self.fits[least] = replace(self.fits[least], related=False)
         return True
+
+
+def _with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
+    """A fit with other rows, (k, n), that explain nothing yet; the same if they are its own."""
+    own = fit.problem.nuisance
+    if own is nuisance or (own is not None and np.array_equal(own, nuisance)):
+        return fit
+    problem = replace(fit.problem, nuisance=nuisance)
+    weights = np.zeros(0 if nuisance is None else len(nuisance))
+    best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
+    return replace(fit, problem=problem, best=best, trials=(best,))
 
 
 def contribution(fit: JointFit) -> Real:

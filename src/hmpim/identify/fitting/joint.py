@@ -9,6 +9,7 @@ The input is then assumed band-limited, or held if it mostly stands still and ju
 record clearly contradicts it.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from hmpim.identify.fitting.beginning import look_again
 from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.course import (
     Course,
+    completed,
     continue_between,
     enrich,
     find_beginning,
@@ -47,7 +49,7 @@ from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
 
-__all__ = ["chosen_of", "joint_fit"]
+__all__ = ["chosen_of", "fit_likeliest", "joint_fit"]
 
 _LOOKS = 2
 """How often the samples that count are reconsidered, once there is a structure."""
@@ -101,6 +103,43 @@ def joint_fit(
     course = interpolate_finely(course)
     course = find_beginning(course)
     return chosen_of(course, structures, growing=growing)
+
+
+def fit_likeliest(
+    inputs: Mapping[int, Real],
+    y: Real,
+    *,
+    valid: Mask | None,
+    known: Mask | None,
+    intersample: Intersample | None,
+    structures: tuple[StructureName, ...],
+    nuisance: Real | None = None,
+) -> tuple[int, JointFit]:
+    """Fit an output to that of several inputs which explains most of it, by its key.
+
+    Further poles are not tested. Inputs, (n,), and the rest are as for `joint_fit`.
+    """
+    found: dict[int, JointFit] = {}
+    if intersample == "sampled":
+        for j, u in inputs.items():
+            found[j] = software_fit(u, y, valid=valid, structures=structures, nuisance=nuisance)
+        return _likeliest(found)
+    courses = {
+        j: turn_ahead(start(u, y, valid, known, intersample, structures, nuisance))
+        for j, u in inputs.items()
+    }
+    least = np.inf
+    for j in sorted(courses, key=lambda j: courses[j].best.cost):
+        if courses[j].best.cost < least:  # a complete fit seldom leaves less than the plain one
+            course = completed(free_from_wander(courses[j]))
+            found[j] = chosen_of(course, structures, growing=False)
+            least = min(least, found[j].best.fit.cost)
+    return _likeliest(found)
+
+
+def _likeliest(found: Mapping[int, JointFit]) -> tuple[int, JointFit]:
+    """The fit that leaves least, with its key."""
+    return min(found.items(), key=lambda item: item[1].best.fit.cost)
 
 
 def chosen_of(
