@@ -379,7 +379,7 @@ def fit_once(
     *,
     begun: Course | Led | None = None,
     excluded: Mapping[int, JointFit] | None = None,
-    fit_drift: Callable[[int, JointFit], OutputFit | None] | None = None,
+    fit_drift: Callable[[Led], OutputFit | None] | None = None,
     leading_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.

@@ -180,7 +180,9 @@ class Pairs:
 def _with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
     """A fit with other rows, (k, n), that explain nothing yet; the same if they are its own."""
     own = fit.problem.nuisance
-    if own is nuisance or (own is not None and np.array_equal(own, nuisance)):
+    if own is nuisance:
+        return fit
+    if own is not None and nuisance is not None and np.array_equal(own, nuisance):
         return fit
     problem = replace(fit.problem, nuisance=nuisance)
     weights = np.zeros(0 if nuisance is None else len(nuisance))
