@@ -269,8 +269,10 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
     freed: OutputFit | None = None
 
     def begun(rows: Real) -> tuple[Problem, Fit]:
+        nonlocal known
         plainly = partial(fit_once, question, seen, question.plain, begun=known)
-        joint = plainly(rows, leading_only=True).fits[0]
+        strong = plainly(rows, strong_only=True)
+        joint, known = strong.fits[strong.leading], strong.led
         return joint.problem, joint.best.fit
 
     def fitted(rows: Real) -> JointFit:
@@ -380,12 +382,12 @@ def fit_once(
     begun: Course | Led | None = None,
     excluded: Mapping[int, JointFit] | None = None,
     fit_drift: Callable[[Led], OutputFit | None] | None = None,
-    leading_only: bool = False,
+    strong_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
     The search continues from `begun`, if it is known: the plain fits to a single input, or fits to
-    some of several. Inputs in `excluded` are not fitted; `fit_drift` and `leading_only` are
+    some of several. Inputs in `excluded` are not fitted; `fit_drift` and `strong_only` are
     as for `fit_together`.
     """
     if isinstance(begun, Course):
@@ -403,5 +405,5 @@ def fit_once(
         excluded=excluded or {},
         led=begun,
         fit_drift=fit_drift,
-        leading_only=leading_only,
+        strong_only=strong_only,
     )

@@ -135,7 +135,7 @@ def fit_together(
     excluded: Mapping[int, JointFit],
     led: Led | None = None,
     fit_drift: Callable[[Led], OutputFit | None] | None = None,
-    leading_only: bool = False,
+    strong_only: bool = False,
 ) -> OutputFit:
     """Fit one output, (n,), to several inputs.
 
@@ -148,8 +148,8 @@ def fit_together(
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the plain fits to the strong inputs, and its value is
-    returned unless it is None. If `leading_only`, only strong inputs are fitted, with plain
-    dynamics, and only the leading input's fit is returned.
+    returned unless it is None. If `strong_only`, only strong inputs are fitted, with plain
+    dynamics, and the others count as unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -159,12 +159,16 @@ def fit_together(
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
     leads = partial(fit_likeliest, known=known, intersample=intersample, nuisance=nuisance)
     pairs.begin(led or _lead(inputs, pairs, partial(leads, structures=plain)), nuisance)
-    if led and leading_only:
+    if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
     _join(inputs, pairs, plainly)
-    if leading_only:
+    if strong_only:
         pairs.refine(pairs.kept, None)
-        return OutputFit(fits=(pairs.fits[pairs.strong[0]],))
+        none = replace(pairs.fits[pairs.strong[0]], related=False)
+        return OutputFit(
+            fits=tuple(pairs.fits.get(j, none) for j in range(len(inputs))),
+            strong=tuple(j in pairs.strong for j in range(len(inputs))),
+        )
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
         drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong})
         if drifting is not None:
