@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from hmpim.arguments import check_argument
 from hmpim.errors import ArgumentError
-from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import (
     BodeCurve,
     deviation_curve,
@@ -21,6 +20,7 @@ from hmpim.plots.curves import (
 )
 from hmpim.plots.description import Axis, Band, Curve, Figure, Item, Panel, Points, Rule
 from hmpim.plots.style import Colour, plain
+from hmpim.record import INTERSAMPLE_WORDS
 from hmpim.units import quotient_unit
 
 if TYPE_CHECKING:

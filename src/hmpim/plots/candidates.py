@@ -4,21 +4,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hmpim.plots.description import Axis, Bars, Figure, Panel, Words
+from hmpim.record import INTERSAMPLE_WORDS
 
 if TYPE_CHECKING:
     from hmpim.identify import Candidate
-    from hmpim.record import Intersample
 
-__all__ = ["INTERSAMPLE_WORDS", "candidates"]
-
-INTERSAMPLE_WORDS: "dict[Intersample, str]" = {
-    "zoh": "held",
-    "foh": "linear",
-    "bandlimited": "band-limited",
-    "feedforward": "held with its derivatives",
-    "sampled": "sampled (software)",
-}
-"""What an input does between its samples, in words a reader knows."""
+__all__ = ["candidates"]
 
 MOST_BARS = 12
 _ROOM = 100.0

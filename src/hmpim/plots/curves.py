@@ -1,6 +1,6 @@
 """The curves behind a Bode plot: a fitted model's response, a measured one with its band."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,6 @@ from hmpim.model.response import RationalDelay, phase, response
 
 if TYPE_CHECKING:
     from hmpim.identify import FrequencyResponse, PairIdentification
-    from hmpim.record import Intersample
 
 __all__ = [
     "BodeCurve",
@@ -24,7 +23,6 @@ __all__ = [
     "stretches",
 ]
 
-ALIASES = 60  # on either side; what is left out is below 0.3 % even without dynamics
 _WHOLE = 1e-4  # of a sample: a period this near to a whole number of samples counts as one
 GAP = 3.0  # times a step beside it: a larger one is no step, but nothing was measured in between
 Z95 = 1.959963984540054  # 97.5 % point of the normal distribution
@@ -124,7 +122,9 @@ def model_curve(
     lag = np.degrees(phase(system, frequency, delay=with_delay))
     values = response(system, frequency)
     if fs is not None and with_delay and pair.intersample in ("zoh", "foh", "feedforward"):
-        values = _as_sampled(system, frequency, fs=fs, between=pair.intersample)
+        from hmpim.identify.reading.bandwidth import sampled_response
+
+        values = sampled_response(system, frequency, fs=fs, intersample=pair.intersample)
         held = lag if pair.intersample == "foh" else lag - 180.0 * frequency / fs
         lag = _near(np.degrees(np.angle(values)), held)
     period = pair.parameters.hold_period
@@ -137,23 +137,6 @@ def model_curve(
         magnitude_db=decibels(scale.value * values),
         phase=lag - 180.0 if scale.value < 0.0 else lag,
     )
-
-
-def _as_sampled(
-    system: RationalDelay, frequency: NDArray[np.float64], *, fs: float, between: "Intersample"
-) -> NDArray[np.complex128]:
-    """Response from samples to samples, the input held or joined linearly between them."""
-    if between == "feedforward":  # the numerator acts before the hold
-        before = np.polynomial.polynomial.polyval(system.variable(frequency), system.numerator)
-        behind = replace(system, numerator=np.ones(1))
-        return np.asarray(before * _as_sampled(behind, frequency, fs=fs, between="zoh"))
-    folded = frequency[:, np.newaxis] + fs * np.arange(-ALIASES, ALIASES + 1)
-    turn = 2j * np.pi * folded / fs
-    hold = (1.0 - np.exp(-turn)) / turn
-    if between == "foh":
-        hold = hold**2 * np.exp(turn)
-    each = response(system, folded.ravel()).reshape(folded.shape)
-    return np.asarray((each * hold).sum(axis=1))
 
 
 def output_hold(

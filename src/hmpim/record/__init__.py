@@ -1,7 +1,13 @@
 """Records: time-stamped channels, each with its unit, and the quality of the data."""
 
 from hmpim.record.align import Aligned, Signal, uniform
-from hmpim.record.channel import BETWEEN, Channel, Intersample, is_held
+from hmpim.record.channel import (
+    BETWEEN,
+    INTERSAMPLE_WORDS,
+    Channel,
+    Intersample,
+    is_held,
+)
 from hmpim.record.clock import Clock, fit_clock, rate_of
 from hmpim.record.describe import Description, describe
 from hmpim.record.finding import Finding, Severity
@@ -17,6 +23,7 @@ from hmpim.record.sweeps import Motion, find_motions
 
 __all__ = [
     "BETWEEN",
+    "INTERSAMPLE_WORDS",
     "ROLES",
     "Aligned",
     "Channel",

@@ -12,7 +12,15 @@ from hmpim.errors import RecordError
 from hmpim.tables import shortened
 from hmpim.units import check_unit
 
-__all__ = ["BETWEEN", "Channel", "Intersample", "frozen_samples", "in_seconds", "is_held"]
+__all__ = [
+    "BETWEEN",
+    "INTERSAMPLE_WORDS",
+    "Channel",
+    "Intersample",
+    "frozen_samples",
+    "in_seconds",
+    "is_held",
+]
 
 Intersample = Literal["zoh", "foh", "bandlimited", "feedforward", "sampled"]
 """Held, linear or band-limited between its samples; held together with its derivatives, which are
@@ -20,6 +28,15 @@ commanded too; or software, which sees the samples alone."""
 
 BETWEEN: tuple[Intersample, ...] = ("zoh", "foh", "bandlimited")
 """What a signal in continuous time may do between its samples: held, linear or band-limited."""
+
+INTERSAMPLE_WORDS: dict[Intersample, str] = {
+    "zoh": "held",
+    "foh": "linear",
+    "bandlimited": "band-limited",
+    "feedforward": "held with its derivatives",
+    "sampled": "sampled (software)",
+}
+"""What an input does between its samples, in words a reader knows."""
 
 
 def is_held(intersample: Intersample) -> bool:

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hmpim.identify import Identification, PairIdentification
-from hmpim.plots.candidates import INTERSAMPLE_WORDS
 from hmpim.plots.curves import is_measured
-from hmpim.record import Finding
+from hmpim.record import INTERSAMPLE_WORDS, Finding
 from hmpim.report.about import About, made_by
 from hmpim.report.advice import leading_findings, said_and_done
 from hmpim.report.figures import Picture, pair_pictures, stimulus_picture

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from hmpim.identify import Estimate, Identification, PairIdentification, Verdict
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import FIXED_UNITS, in_words
-from hmpim.plots.candidates import INTERSAMPLE_WORDS
-from hmpim.record import Finding
+from hmpim.record import INTERSAMPLE_WORDS, Finding
 from hmpim.report.numbers import format_estimate, format_number
 
 __all__ = [

@@ -6,19 +6,12 @@ from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import rivals_of
 from hmpim.identify.result.groups import PHASE_SPLIT, SIZES, in_words
 from hmpim.identify.worth import FEW, PART
-from hmpim.record import Finding, Intersample
+from hmpim.record import INTERSAMPLE_WORDS, Finding, Intersample
 
 __all__ = ["other_intersample", "undetermined_between", "wide_span"]
 
 _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 """Figures that move with the delay, or with the structure."""
-
-_WORDS: dict[Intersample, str] = {
-    "zoh": "held",
-    "foh": "linear",
-    "bandlimited": "band-limited",
-    "feedforward": "held with its derivatives",
-}
 
 
 def other_intersample(evidence: Evidence) -> Iterator[Finding]:
@@ -43,13 +36,14 @@ def undetermined_between(
     for mode, apart, other in rivals:
         if other or abs(apart) > FEW:
             model = f"{_a_model(other)} and " if other else ""
-            moves.append(f"{_WORDS[mode]}, with {model}{_delay(apart)}")
+            moves.append(f"{INTERSAMPLE_WORDS[mode]}, with {model}{_delay(apart)}")
     if not moves:
         return
     yield Finding(
         code="intersample",
         message="This record does not determine what the input does between its samples. "
-        f"The input is assumed to be {_WORDS[taken]}; it may also be {', or '.join(moves)}. "
+        f"The input is assumed to be {INTERSAMPLE_WORDS[taken]}; "
+        f"it may also be {', or '.join(moves)}. "
         "The intervals cover this. If you know it, state it with intersample=.",
         severity="info",
         parameters=_SHIFTED,

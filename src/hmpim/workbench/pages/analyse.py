@@ -11,7 +11,7 @@ from nicegui import events, ui
 from hmpim.errors import ArgumentError
 from hmpim.identify import Identification
 from hmpim.model.dynamics import STRUCTURES
-from hmpim.plots.candidates import INTERSAMPLE_WORDS
+from hmpim.record import INTERSAMPLE_WORDS
 from hmpim.report.words import structure_words
 from hmpim.workbench.bench import Window
 from hmpim.workbench.desks import Analysis
