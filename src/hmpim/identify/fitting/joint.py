@@ -277,18 +277,21 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
 
 
 def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
-    """Fit each servo structure with its zeros in front of the hold, if zeros lead.
+    """Fit each servo structure with its zeros in front of the hold.
 
-    Otherwise they would only explain the ends of the record.
+    If no zeros lead, only structures with no more parameters than the leading one: with more they
+    would only explain the ends of the record.
     """
-    leading = min(trials, key=lambda trial: trial.criterion).fit.structure
-    if not _tries_feedforward(course) or leading.zeros == leading.dc_zeros:
+    best = min(trials, key=lambda trial: trial.criterion).fit
+    leading = best.structure
+    if not _tries_feedforward(course) or leading.dc_zeros:
         return []
+    most = np.inf if leading.zeros else leading.parameters
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
     found = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
         structure = trial.fit.structure
-        if structure in known or not may_be_fed_forward(structure):
+        if structure in known or not may_be_fed_forward(structure) or structure.parameters > most:
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
