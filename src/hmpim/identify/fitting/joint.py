@@ -138,8 +138,26 @@ def settle(
 
 
 def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
-    """Choose among all fits, and again where the best of them shows that other samples count."""
-    course, trials, best, share = _weigh(course, fitted)
+    """Choose among all fits, and again where the best of them shows that other samples count.
+
+    Zeros in front of the hold would explain ends of the record that do not count. So they are only
+    tried once these are left out; if they lead, what else was left out is decided anew.
+    """
+    looked, trials, best, share = _looked_again(course, fitted)
+    found = _fed_forward(looked, trials, _counting(looked, share))
+    if not found:
+        return looked, trials, best, share
+    best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
+    if best.intersample == "feedforward" and looked.counted is not course.counted:
+        return _looked_again(course, fitted, fed_forward=True)
+    return looked, trials, best, share
+
+
+def _looked_again(
+    course: Course, fitted: Fits, *, fed_forward: bool = False
+) -> tuple[Course, list[Trial], Trial, float]:
+    """Choose among all fits until the samples that count stay the same, or after two looks."""
+    course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
@@ -155,7 +173,7 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         others = [(mode, fit) for mode, fit in fitted if (mode, fit.structure) != chosen]
         others = [(m, f) for m, f in others if f.cost < most or f.structure.name in PLAIN]
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
-        course, trials, best, share = _weigh(course, fitted)
+        course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
     return course, trials, best, share
 
 
@@ -253,7 +271,9 @@ def give_up(course: Course, fitted: Fits) -> JointFit:
     return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
-def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
+def _weigh(
+    course: Course, fitted: Fits, *, fed_forward: bool
+) -> tuple[Course, list[Trial], Trial, float]:
     """Compare all fits under one noise model, and polish the best.
 
     Return the course with that model, all trials, the best trial, and the effective share.
@@ -265,15 +285,27 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
     if weighed.noise is not None or data.noise is not None:
         course = replace(course, data=weighed)
         fitted = refit_all(weighed, fitted, seen, hopeful=TWICE * leading.objective)
-    count = course.problem.counted * (share if course.data.noise is None else 1.0)
+    count = _counting(course, share)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    trials += _fed_forward(course, trials, count)
+    if fed_forward:
+        trials += _fed_forward(course, trials, count)
+    best, trials = _chosen(course, trials, count)
+    return course, trials, best, share
+
+
+def _counting(course: Course, share: float) -> float:
+    """Independent samples: all that count if the noise is whitened."""
+    return course.problem.counted * (share if course.data.noise is None else 1.0)
+
+
+def _chosen(course: Course, trials: list[Trial], count: float) -> tuple[Trial, list[Trial]]:
+    """The likeliest trial, polished, and all trials with it."""
     chosen = likeliest_of(trials, course.natural)
     fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
     best = trial_of(
         chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
     )
-    return course, [best if trial is chosen else trial for trial in trials], best, share
+    return best, [best if trial is chosen else trial for trial in trials]
 
 
 def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
@@ -295,7 +327,14 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", iterations=40)
+        fit = refit_between(
+            problem,
+            trial.fit,
+            trial.intersample,
+            "feedforward",
+            iterations=40,
+            hopeless=TWICE * best.objective,
+        )
         found.append(trial_of("feedforward", fit, count))
     return found
 
