@@ -173,3 +173,23 @@ def test_exported_programs_play_the_model(target, tmp_path):
     wanted = hmpim.predict(result.pairs[0], given).predicted
     allowed = 0.05 if target == "scipy" else 1e-4  # a script knows the held command alone
     assert np.std(played - wanted) < allowed * np.std(wanted)
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_feedforward_is_found_where_four_poles_seem_to_lead(seed):
+    fs, samples, w = 100.0, 1618, 2 * np.pi * 16.2
+    time = np.arange(samples) / fs
+    fade = np.clip(np.minimum(time, time[-1] - time) / 0.5, 0.0, 1.0)
+    u = np.sin(0.5 * np.pi * fade) ** 2
+    u *= np.sin(2 * np.pi * (0.1 * time + 17.35 / time[-1] * time**2))
+    model = hmpim.Model(
+        delay=0.2114,
+        scale_factor=1.0,
+        denominator=tuple(np.convolve([0.002, 1.0], [1 / w**2, 1.58 / w, 1.0])),
+        numerator=(0.0114, 1.0),
+    )
+    y = hmpim.simulate(model, u, fs=fs, intersample="feedforward")
+    y += 0.028 * np.random.default_rng(seed).standard_normal(samples)
+    pair = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, fs=fs)).pairs[0]
+    assert (pair.structure, pair.intersample) == ("third_order_zero", "feedforward")
+    assert pair.parameters.delay.value == pytest.approx(0.2114, abs=0.001)  # a tenth of a sample

@@ -23,6 +23,7 @@ from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
+from hmpim.identify.fitting.second_zero import with_second_zero
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
 from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
@@ -323,6 +324,7 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         richer = fit_rich(
             data, course.problem, fits, course.others, all_of_them=not plain, shared=course.shared
         )
+        richer = with_second_zero(course.problem, fits, richer, course.others)
     if not required and not any(fit.is_white for fit in richer):
         richer = []
     tried = [*fits, *richer]

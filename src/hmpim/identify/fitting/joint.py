@@ -177,8 +177,26 @@ def settle(
 
 
 def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
-    """Choose among all fits, and again where the best of them shows that other samples count."""
-    course, trials, best, share = _weigh(course, fitted)
+    """Choose among all fits, and again where the best of them shows that other samples count.
+
+    Zeros in front of the hold would explain ends of the record that do not count. So they are only
+    tried once these are left out; if they lead, what else was left out is decided anew.
+    """
+    looked, trials, best, share = _looked_again(course, fitted)
+    found = _fed_forward(looked, trials, _counting(looked, share))
+    if not found:
+        return looked, trials, best, share
+    best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
+    if best.intersample == "feedforward" and looked.counted is not course.counted:
+        return _looked_again(course, fitted, fed_forward=True)
+    return looked, trials, best, share
+
+
+def _looked_again(
+    course: Course, fitted: Fits, *, fed_forward: bool = False
+) -> tuple[Course, list[Trial], Trial, float]:
+    """Choose among all fits until the samples that count stay the same, or after two looks."""
+    course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
@@ -194,7 +212,7 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
         others = [(mode, fit) for mode, fit in fitted if (mode, fit.structure) != chosen]
         others = [(m, f) for m, f in others if f.cost < most or f.structure.name in PLAIN]
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
-        course, trials, best, share = _weigh(course, fitted)
+        course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
     return course, trials, best, share
 
 
@@ -292,7 +310,9 @@ def give_up(course: Course, fitted: Fits) -> JointFit:
     return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
-def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
+def _weigh(
+    course: Course, fitted: Fits, *, fed_forward: bool
+) -> tuple[Course, list[Trial], Trial, float]:
     """Compare all fits under one noise model, and polish the best.
 
     Return the course with that model, all trials, the best trial, and the effective share.
@@ -304,34 +324,56 @@ def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, fl
     if weighed.noise is not None or data.noise is not None:
         course = replace(course, data=weighed)
         fitted = refit_all(weighed, fitted, seen, hopeful=TWICE * leading.objective)
-    count = course.problem.counted * (share if course.data.noise is None else 1.0)
+    count = _counting(course, share)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    trials += _fed_forward(course, trials, count)
+    if fed_forward:
+        trials += _fed_forward(course, trials, count)
+    best, trials = _chosen(course, trials, count)
+    return course, trials, best, share
+
+
+def _counting(course: Course, share: float) -> float:
+    """Independent samples: all that count if the noise is whitened."""
+    return course.problem.counted * (share if course.data.noise is None else 1.0)
+
+
+def _chosen(course: Course, trials: list[Trial], count: float) -> tuple[Trial, list[Trial]]:
+    """The likeliest trial, polished, and all trials with it."""
     chosen = likeliest_of(trials, course.natural)
     fit, problem = chosen.fit, course.data.problem(chosen.intersample, course.counted)
     best = trial_of(
         chosen.intersample, fit if fit is course.settled else polished(problem, fit), count
     )
-    return course, [best if trial is chosen else trial for trial in trials], best, share
+    return best, [best if trial is chosen else trial for trial in trials]
 
 
 def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
-    """Fit each servo structure with its zeros in front of the hold, if zeros lead.
+    """Fit each servo structure with its zeros in front of the hold.
 
-    Otherwise they would only explain the ends of the record.
+    If no zeros lead, only structures with no more parameters than the leading one: with more they
+    would only explain the ends of the record.
     """
-    leading = min(trials, key=lambda trial: trial.criterion).fit.structure
-    if not _tries_feedforward(course) or leading.zeros == leading.dc_zeros:
+    best = min(trials, key=lambda trial: trial.criterion).fit
+    leading = best.structure
+    if not _tries_feedforward(course) or leading.dc_zeros:
         return []
+    most = np.inf if leading.zeros else leading.parameters
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
     found = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
         structure = trial.fit.structure
-        if structure in known or not may_be_fed_forward(structure):
+        if structure in known or not may_be_fed_forward(structure) or structure.parameters > most:
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", iterations=40)
+        fit = refit_between(
+            problem,
+            trial.fit,
+            trial.intersample,
+            "feedforward",
+            iterations=40,
+            hopeless=TWICE * best.objective,
+        )
         found.append(trial_of("feedforward", fit, count))
     return found
 
