@@ -285,14 +285,17 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
     if not _tries_feedforward(course) or leading.zeros == leading.dc_zeros:
         return []
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
-    found = []
+    found: list[Trial] = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
-        structure = trial.fit.structure
+        structure, mode = trial.fit.structure, trial.intersample
         if structure in known or not may_be_fed_forward(structure):
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        fit = refit_between(problem, trial.fit, trial.intersample, "feedforward", iterations=40)
+        hopeless = TWICE * min(each.fit.objective for each in [*trials, *found])
+        fit = refit_between(
+            problem, trial.fit, mode, "feedforward", iterations=40, hopeless=hopeless
+        )
         found.append(trial_of("feedforward", fit, count))
     return found
 
