@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.start import RoughResponse, distinct
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
@@ -82,20 +82,22 @@ def fitted_roughly(
     `steps` are taken.
     """
     now = _Rough(rough, structure, thetas)
+    thetas, errors, (normal, moment) = thetas.copy(), now.errors, now.normal()
     damping = np.full(len(thetas), 1e-3)
     for _ in range(steps):
-        step = now.steps(damping) * (np.arange(thetas.shape[1]) >= held)
-        then = _Rough(rough, structure, _bounded(structure, now.thetas + step))
-        better = then.errors < now.errors
-        still = ~(now.errors - then.errors > _STILL * now.errors)
+        step = _damped(normal, moment, damping) * (np.arange(thetas.shape[1]) >= held)
+        then = _Rough(rough, structure, _bounded(structure, thetas + step))
+        better, still = then.errors < errors, ~(errors - then.errors > _STILL * errors)
         damping = np.where(better, damping / _FACTOR, damping * _FACTOR)
-        now = then.unless(better, now)
+        state = (thetas, errors, normal, moment)
+        for own, new in zip(state, (then.thetas, then.errors, *then.normal()), strict=True):
+            own[better] = new[better]
         if np.all(still & (better | (damping > _FACTOR))):
             break
-    least = float(now.errors.min())
-    order = [i for i in np.argsort(now.errors) if now.errors[i] <= TWICE * least]
+    least = float(errors.min())
+    order = [i for i in np.argsort(errors) if errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)
-    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(now.thetas[order])))
+    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(thetas[order])))
 
 
 def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:
@@ -173,16 +175,14 @@ class _Rough:
         errors = np.vecdot(self.residuals, self.residuals)
         self.errors = np.where(np.isfinite(errors), errors, np.inf)
 
-    def steps(self, damping: Real) -> Real:
-        """Steps of all parameters, shape (k, 1 + order)."""
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations of all parameters: (k, 1 + order, 1 + order) and (k, 1 + order)."""
         s, count = self._s, len(self._sections)
-        linear = self.linear[..., None]
-        whole = (linear * self._rows).sum(axis=1)
+        moved = self.linear[..., None] * self._rows
+        whole = moved.sum(axis=1)
         slopes = [-s * whole]
         for k, (section, factors) in enumerate(self._sections):
-            own = whole
-            if self.structure.parallel:
-                own = (linear * self._rows)[:, k::count].sum(axis=1)
+            own = moved[:, k::count].sum(axis=1) if self.structure.parallel else whole
             slopes += [-own * factor / section for factor in factors]
         rows = _real(np.stack(slopes, axis=1))
         mixed = rows @ self._real.swapaxes(1, 2)
@@ -190,21 +190,18 @@ class _Rough:
         # For a direction that the numerator explains fully, only rounding remains, of either sign.
         least = np.finfo(float).eps * np.einsum("kii->ki", normal) + np.finfo(float).tiny
         normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
-        moment = rows @ self.residuals[..., None]
-        diagonal = np.maximum(np.einsum("kii->ki", normal), least)
-        scale = np.sqrt(diagonal)
-        scaled = normal / (scale[:, :, None] * scale[:, None, :])
-        scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
-        found = np.linalg.solve(scaled, moment / scale[..., None])[..., 0] / scale
-        return np.asarray(np.where(np.isfinite(found), found, 0.0))
+        diagonal = np.einsum("kii->ki", normal)
+        diagonal[:] = np.maximum(diagonal, least)
+        return normal, (rows @ self.residuals[..., None])[..., 0]
 
-    def unless(self, better: Mask, before: "_Rough") -> "_Rough":
-        """The same, with the state before where this one is not better."""
-        if not better.all():
-            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "residuals"):
-                getattr(self, name)[~better] = getattr(before, name)[~better]
-            self._sections = _sections(self.structure, self.thetas, self._s)
-        return self
+
+def _damped(normal: Real, moment: Real, damping: Real) -> Real:
+    """Steps of all parameters, shape (k, 1 + order)."""
+    scale = np.sqrt(np.einsum("kii->ki", normal))
+    scaled = normal / (scale[:, :, None] * scale[:, None, :])
+    scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
+    found = np.linalg.solve(scaled, (moment / scale)[..., None])[..., 0] / scale
+    return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
 
 def _real(rows: Complex) -> Real:
