@@ -23,7 +23,6 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -32,6 +31,7 @@ from hmpim.identify.fitting.course import (
     free_from_wander,
     start,
     turn_ahead,
+    with_fewer_rows,
 )
 from hmpim.identify.fitting.data import follows
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -171,8 +171,9 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
-        # The rows that were tried last, and plain fits of a single input with them
-        self.begun: tuple[Real, Course] | None = None
+        self.begun: Course | None = (
+            None  # fits of a single input with the rows that were tried last
+        )
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
@@ -205,12 +206,9 @@ class _WithRows:
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        question, before = self.question, self.latest
-        names = question.plain if plainly else question.structures
+        names = self.question.plain if plainly else self.question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = self._fitted(names, every)
-        if not self.several and not plainly and before is not self.first:
-            self.latest = _as_before(question, self.seen, every, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -219,16 +217,16 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
-        question, seen = self.question, self.seen
+        """Fit all inputs with rows; a single input with fewer rows in the same structures again."""
+        question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             return fit_once(question, seen, names, rows, excluded=self.unrelated)
-        if self.begun is None or not np.array_equal(self.begun[0], rows):
-            self.begun = (
-                rows,
-                completed(free_from_wander(turn_ahead(started(question, seen, rows)))),
-            )
-        course = self.begun[1]
+        known = None if course is None else course.data.nuisance
+        if course is None or known is None or len(rows) > len(known):
+            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
+        elif len(rows) < len(known):
+            course = with_fewer_rows(course, self.latest.fits[0], rows)
+        self.begun = course
         others = tuple(name for name in course.others if name in names)
         return OutputFit(fits=(chosen_of(replace(course, others=others), names),))
 
@@ -239,23 +237,6 @@ class _WithRows:
         hum = None if self.humming is None else self.humming.rows
         self.freed = _all_free(self.question, self.latest, self.asked, hum)
         return None if self.freed is None else self.freed.fits[self.asked]
-
-
-def _as_before(
-    question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
-) -> OutputFit:
-    """The fit that a search with `rows` found, or the plainer dynamics found before if likelier.
-
-    A search may end in a large number of modes.
-    """
-    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
-    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
-        return found
-    course = completed(turn_ahead(started(question, seen, rows)))
-    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
-    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
-    return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
 def _plain_beside_drift(

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.enrich import (
     with_fit,
     without_fast,
 )
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, bounded_for, fit_structure
 from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import is_all_behind_hold, steps_through
 from hmpim.identify.fitting.modes import grown_modes
@@ -131,8 +131,12 @@ def fit_plain(
 
 
 def _tasted(problem: Problem, starts: Sequence[Real], best: Fit, largest: float) -> Fit:
-    """The best of a fit and of a few steps from each other promising start."""
-    for theta in starts:
+    """The best of a fit and of a few steps from each other promising start.
+
+    Starts beyond the bounds may be the same one within them.
+    """
+    within = [bounded_for(problem, best.structure, theta) for theta in starts]
+    for theta in {theta.tobytes(): theta for theta in within}.values():
         hopeless = min(TWICE * best.objective, largest)
         rival = fit_structure(problem, best.structure, theta, iterations=TASTE, hopeless=hopeless)
         best = min(best, rival, key=lambda fit: fit.objective)

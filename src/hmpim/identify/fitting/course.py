@@ -25,6 +25,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
+from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -46,6 +47,7 @@ __all__ = [
     "looks_held",
     "start",
     "turn_ahead",
+    "with_fewer_rows",
 ]
 
 _SOME = 100
@@ -292,6 +294,18 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
+
+
+def with_fewer_rows(course: Course, joint: JointFit, nuisance: Real) -> Course:
+    """Fit the structures of a joint fit to the same samples with fewer rows, without a new search.
+
+    The `course` has the plain fits from which that search began.
+    """
+    data, problem = replace(course.data, nuisance=nuisance), joint.problem
+    counted = Counted(valid=problem.valid, begins=problem.begins)
+    course = replace(course, data=data, others=(), counted=counted)
+    fits = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
+    return replace(course, fits=_again(course, fits))
 
 
 def continue_between(course: Course) -> Fits:
