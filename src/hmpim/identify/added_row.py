@@ -14,7 +14,7 @@ from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import counted_in, fit, fit_once, started
 from hmpim.identify.fitting.candidates import is_poor, spans_record
-from hmpim.identify.fitting.course import Course, completed, turn_ahead
+from hmpim.identify.fitting.course import Course, completed, resumed, turn_ahead
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -275,10 +275,10 @@ def _with_rows(
         attempts.append((replace(fitted, drifting=None), question.output.values, None))
     for other, y, rows in attempts:
         steady = replace(question, output=replace(question.output, values=y))
-        course = _plain(steady, seen, rows, fitted.begun)
+        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
+        course = _plain(steady, seen, leading, fitted.begun)
         problem = course.problem
         count = 1 - (joint.problem.fixed().shape[0] - problem.fixed().shape[0])
-        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
@@ -304,10 +304,13 @@ def _with_rows(
 
 
 def _plain(
-    question: Question, seen: Imperfections, rows: Real | None, known: Course | None
+    question: Question, seen: Imperfections, joint: JointFit, known: Course | None
 ) -> Course:
-    """Plain fits of one input, which are `known` if the search began with the same data."""
-    if known is not None and rows is None:
+    """Plain fits of one input to the data of a joint fit; `known` are those without rows."""
+    rows = joint.problem.nuisance
+    if known is not None and rows is not None:
+        return resumed(known, joint, rows, question.plain)
+    if known is not None:
         counts, y = counted_in(question, seen), question.output.values
         if np.array_equal(known.data.y, y) and count_alike(known.given.valid, counts):
             return known

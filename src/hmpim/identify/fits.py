@@ -29,9 +29,9 @@ from hmpim.identify.fitting.course import (
     completed,
     continued,
     free_from_wander,
+    resumed,
     start,
     turn_ahead,
-    with_fewer_rows,
 )
 from hmpim.identify.fitting.data import follows
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -225,7 +225,7 @@ class _WithRows:
         if course is None or known is None or len(rows) > len(known):
             course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
         elif len(rows) < len(known):
-            course = with_fewer_rows(course, self.latest.fits[0], rows)
+            course = resumed(course, self.latest.fits[0], rows, names)
         self.begun = course
         others = tuple(name for name in course.others if name in names)
         return OutputFit(fits=(chosen_of(replace(course, others=others), names),))

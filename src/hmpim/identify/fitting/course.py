@@ -45,9 +45,9 @@ __all__ = [
     "free_from_wander",
     "is_unanswered",
     "looks_held",
+    "resumed",
     "start",
     "turn_ahead",
-    "with_fewer_rows",
 ]
 
 _SOME = 100
@@ -296,16 +296,21 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     return completed(course)
 
 
-def with_fewer_rows(course: Course, joint: JointFit, nuisance: Real) -> Course:
-    """Fit the structures of a joint fit to the same samples with fewer rows, without a new search.
+def resumed(
+    course: Course, joint: JointFit, rows: Real, structures: tuple[StructureName, ...]
+) -> Course:
+    """Fit structures of a joint fit again to the same samples, with its rows or fewer.
 
-    The `course` has the plain fits from which that search began.
+    The `course` has the plain fits of the same record; no other structure will be tried.
     """
-    data, problem = replace(course.data, nuisance=nuisance), joint.problem
+    problem = joint.problem
+    data = replace(course.data, y=problem.y, nuisance=rows)
     counted = Counted(valid=problem.valid, begins=problem.begins)
     course = replace(course, data=data, others=(), counted=counted)
-    fits = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
-    return replace(course, fits=_again(course, fits))
+    natural = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
+    return replace(
+        course, fits=_again(course, [f for f in natural if f.structure.name in structures])
+    )
 
 
 def continue_between(course: Course) -> Fits:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.fitting.candidates import PRECISION
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -130,8 +131,9 @@ def linear_starts(
             starts[trial.fit.structure.name] = trial.fit.theta
     if _SERVOS[2] in starts:
         starts.setdefault(_SERVOS[1], starts[_SERVOS[2]])
+    limits = {"precision": PRECISION / plain.share, "hopeless": hopeless}
     servos = [
-        fit_structure(problem, STRUCTURES[name], starts[name], hopeless=hopeless)
+        fit_structure(problem, STRUCTURES[name], starts[name], **limits)
         for name in _SERVOS
         if name in starts and name in structures
     ]
