@@ -225,7 +225,10 @@ class _WithRows:
         if course is None or known is None or len(rows) > len(known):
             course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
         elif len(rows) < len(known):
-            course = resumed(course, self.latest.fits[0], rows, names)
+            joint = self.latest.fits[0]
+            fits = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
+            course = replace(course, others=())
+            course = resumed(course, replace(joint.problem, nuisance=rows), fits)
         self.begun = course
         others = tuple(name for name in course.others if name in names)
         return OutputFit(fits=(chosen_of(replace(course, others=others), names),))

@@ -25,7 +25,6 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
-from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -296,21 +295,26 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     return completed(course)
 
 
-def resumed(
-    course: Course, joint: JointFit, rows: Real, structures: tuple[StructureName, ...]
-) -> Course:
-    """Fit structures of a joint fit again to the same samples, with its rows or fewer.
+def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
+    """Fit structures to other data of the same input, each from where its fit ended.
 
-    The `course` has the plain fits of the same record; no other structure will be tried.
+    `problem` has the output, the rows and the samples that count.
     """
-    problem = joint.problem
-    data = replace(course.data, y=problem.y, nuisance=rows)
-    counted = Counted(valid=problem.valid, begins=problem.begins)
-    course = replace(course, data=data, others=(), counted=counted)
-    natural = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
-    return replace(
-        course, fits=_again(course, [f for f in natural if f.structure.name in structures])
-    )
+    y, lag = _level(problem.y, problem.nuisance, problem.valid), course.data.rough.lag
+    ahead = lag if lag < 0 else None
+    rough = rough_response(course.data.u, y, longest_delay=longest_lag(y.size), lag=ahead)
+    data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
+    seen = Counted(valid=problem.valid, begins=problem.begins)
+    course = replace(course, data=data, counted=seen, settled=None)
+    course = replace(course, fits=_again(course, fits))
+    course = replace(course, counted=_count_from_rest(course, course.best))
+    return replace(course, fits=_again(course, course.fits))
+
+
+def _count_from_rest(course: Course, fit: Fit) -> Counted:
+    """Samples that count by a fit that begins at rest: the record may or may not."""
+    from_rest = refit(course.data.problem(course.natural, course.given), fit)
+    return count_in(course.data, course.natural, [from_rest], course.given, course.known)
 
 
 def continue_between(course: Course) -> Fits:
@@ -352,8 +356,7 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         return course, fitted
     if course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
-        from_rest = refit(data.problem(course.natural, course.given), leading)
-        resting = count_in(data, course.natural, [from_rest], course.given, course.known)
+        resting = _count_from_rest(course, leading)
         # If it is at rest after all, the structure was wrong, and not the beginning.
         at_rest = resting.begins is None
         counted = resting if at_rest else begin_later(course.counted, leading)

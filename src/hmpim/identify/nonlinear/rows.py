@@ -102,7 +102,8 @@ def linear_part(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
 def linear_part_finely(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
     """The same on the finer clock."""
     steps = np.arange(FINE)[:, None] * np.eye(1, fit.theta.size) / FINE
-    parts = [part_of(problem, fit.structure, fit.theta - step) for step in steps]
+    driving = replace(problem, begins=None)
+    parts = [part_of(driving, fit.structure, fit.theta - step) for step in steps]
     driven = np.stack([part.driven(fit.linear[:-1]) for part in parts], axis=1)
     rest = np.zeros(driven.shape[0]) if others is None else others
     if fit.initial.size:
