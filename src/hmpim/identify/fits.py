@@ -27,13 +27,14 @@ from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,
+    continue_between,
     continued,
     free_from_wander,
     resumed,
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import follows
+from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of, joint_fit
 from hmpim.identify.fitting.tail import hidden_tail
@@ -153,7 +154,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
-    return _WithRows(question, seen, fitted).found()
+    return _WithRows(question, seen, fitted, begun if isinstance(begun, Course) else None).found()
 
 
 class _WithRows:
@@ -163,7 +164,9 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
+    def __init__(
+        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
+    ) -> None:
         self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
@@ -171,9 +174,8 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
-        self.begun: Course | None = (
-            None  # fits of a single input with the rows that were tried last
-        )
+        self.begun = begun  # fits of a single input, with the rows that were tried last
+        self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
@@ -221,17 +223,21 @@ class _WithRows:
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             return fit_once(question, seen, names, rows, excluded=self.unrelated)
-        known = None if course is None else course.data.nuisance
-        if course is None or known is None or len(rows) > len(known):
+        known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
+        if course is None or (course.data.noise is not None and len(rows) != known):
             course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-        elif len(rows) < len(known):
+        elif len(rows) > known:
+            course = resumed(course, replace(course.problem, nuisance=rows), course.fits)
+        elif len(rows) < known:
             joint = self.latest.fits[0]
             fits = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
             course = replace(course, others=())
             course = resumed(course, replace(joint.problem, nuisance=rows), fits)
-        self.begun = course
+        if course is not self.begun:
+            self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
-        return OutputFit(fits=(chosen_of(replace(course, others=others), names),))
+        joint = chosen_of(replace(course, others=others), names, fitted=self.between)
+        return OutputFit(fits=(joint,))
 
     def steadily(self, _: JointFit) -> JointFit | None:
         """The same dynamics of several inputs with a constant bias, from a state that is free."""

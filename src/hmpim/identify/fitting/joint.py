@@ -104,13 +104,18 @@ def joint_fit(
 
 
 def chosen_of(
-    course: Course, structures: tuple[StructureName, ...], *, growing: bool = True
+    course: Course,
+    structures: tuple[StructureName, ...],
+    *,
+    growing: bool = True,
+    fitted: Fits | None = None,
 ) -> JointFit:
     """Finish the search once the plain structures are fitted to the samples that count.
 
-    The course has the plain fits under the natural assumption; the rest is as for `joint_fit`.
+    The course has the plain fits under the natural assumption, and `fitted`, if known, those under
+    each assumption; the rest is as for `joint_fit`.
     """
-    fitted = continue_between(course)
+    fitted = fitted or continue_between(course)
     if is_unanswered(course, fitted):
         return give_up(course, fitted)
     course, fitted = enrich(course, fitted)
