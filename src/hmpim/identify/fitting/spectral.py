@@ -81,19 +81,20 @@ def fitted_roughly(
     The rough response is best `condensed`. The delay stays if it is `held`. At most so many
     `steps` are taken.
     """
-    now = _Rough(rough, structure, thetas)
-    thetas, errors, (normal, moment) = thetas.copy(), now.errors, now.normal()
-    damping = np.full(len(thetas), 1e-3)
+    model = _Rough(rough, structure)
+    errors, (normal, moment) = model.errors(thetas), model.normal()
+    thetas, damping = thetas.copy(), np.full(len(thetas), 1e-3)
     for _ in range(steps):
         step = _damped(normal, moment, damping) * (np.arange(thetas.shape[1]) >= held)
-        then = _Rough(rough, structure, _bounded(structure, thetas + step))
-        better, still = then.errors < errors, ~(errors - then.errors > _STILL * errors)
+        moved = _bounded(structure, thetas + step)
+        then = model.errors(moved)
+        better, still = then < errors, ~(errors - then > _STILL * errors)
         damping = np.where(better, damping / _FACTOR, damping * _FACTOR)
-        state = (thetas, errors, normal, moment)
-        for own, new in zip(state, (then.thetas, then.errors, *then.normal()), strict=True):
-            own[better] = new[better]
+        thetas[better], errors[better] = moved[better], then[better]
         if np.all(still & (better | (damping > _FACTOR))):
             break
+        for own, new in zip((normal, moment), model.normal(), strict=True):
+            own[better] = new[better]
     least = float(errors.min())
     order = [i for i in np.argsort(errors) if errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)
@@ -142,45 +143,50 @@ def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tupl
 
 def residual_of(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
     """Residual of a rough response for a structure at given parameters, (1 + order,)."""
-    weighted = _Rough(rough, structure, theta[None]).residuals[0].view(np.complex128)
+    model = _Rough(rough, structure)
+    model.errors(theta[None])
+    weighted = model.residuals[0].view(np.complex128)
     response = np.asarray(weighted / np.sqrt(rough.weight), dtype=np.complex128)
     return replace(rough, response=response)
 
 
 class _Rough:
-    """Responses of one structure at several parameters, the numerators solved for."""
+    """Responses of one structure at the latest parameters, the numerators solved for."""
 
-    def __init__(self, rough: RoughResponse, structure: Structure, thetas: Real) -> None:
-        self.rough, self.structure, self.thetas = rough, structure, thetas
-        root = np.sqrt(rough.weight)
+    def __init__(self, rough: RoughResponse, structure: Structure) -> None:
+        self.structure, self._lag, self._root = structure, rough.lag, np.sqrt(rough.weight)
         s = self._s = np.asarray(1j * rough.omega, dtype=np.complex128)
-        late = np.exp(-s * (thetas[:, :1] - rough.lag)) * root
+        self._target = _real(rough.response * self._root)
+        self._scaled = s * (1.0 / rough.omega[-1])
+        powers = np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
+        self._powers = None if structure.parallel else self._scaled**powers
+
+    def errors(self, thetas: Real) -> Real:
+        """Squared errors at several parameters, (k, 1 + order): shape (k,)."""
+        s, structure, target = self._s, self.structure, self._target
+        late = np.exp(-s * (thetas[:, :1] - self._lag)) * self._root
         self._sections = _sections(structure, thetas, s)
         below = [1.0 / section for section, _ in self._sections]
-        scale = 1.0 / rough.omega[-1]
-        if structure.parallel:
+        if self._powers is not None:
+            rows = math.prod(below, start=late)[:, None, :] * self._powers
+        else:
             rows = np.stack([late * each for each in below], axis=1)
             if structure.zeros == structure.order - 1:
-                rows = np.concatenate([rows, rows * (s * scale)], axis=1)
-        else:
-            whole = math.prod(below, start=late)
-            powers = (s * scale) ** np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
-            rows = whole[:, None, :] * powers
+                rows = np.concatenate([rows, rows * self._scaled], axis=1)
         self._rows = rows
         self._real = _real(rows)
-        target = _real(rough.response * root)
         self._gram = _ridged(self._real @ self._real.swapaxes(1, 2))
         self.linear = np.linalg.solve(self._gram, self._real @ target[:, None])[..., 0]
         self.residuals = target - (self.linear[:, None, :] @ self._real)[:, 0]
         errors = np.vecdot(self.residuals, self.residuals)
-        self.errors = np.where(np.isfinite(errors), errors, np.inf)
+        return np.asarray(np.where(np.isfinite(errors), errors, np.inf))
 
     def normal(self) -> tuple[Real, Real]:
         """Normal equations of all parameters: (k, 1 + order, 1 + order) and (k, 1 + order)."""
-        s, count = self._s, len(self._sections)
+        count = len(self._sections)
         moved = self.linear[..., None] * self._rows
         whole = moved.sum(axis=1)
-        slopes = [-s * whole]
+        slopes = [-self._s * whole]
         for k, (section, factors) in enumerate(self._sections):
             own = moved[:, k::count].sum(axis=1) if self.structure.parallel else whole
             slopes += [-own * factor / section for factor in factors]
@@ -210,9 +216,10 @@ def _real(rows: Complex) -> Real:
 
 
 def _ridged(gram: Real) -> Real:
-    """The same with its diagonal raised by about its rounding error."""
-    diagonal = np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny)
-    return np.asarray(gram + _LEAST * diagonal[:, :, None] * np.eye(gram.shape[-1]))
+    """The same matrices, their diagonals raised by about their rounding error."""
+    diagonal = np.einsum("kii->ki", gram)
+    diagonal += _LEAST * np.maximum(diagonal, np.finfo(float).tiny)
+    return gram
 
 
 def _sections(
