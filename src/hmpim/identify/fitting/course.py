@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, every_of, median
+from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
@@ -307,7 +307,10 @@ def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
     seen = Counted(valid=problem.valid, begins=problem.begins)
     course = replace(course, data=data, counted=seen, settled=None)
     course = replace(course, fits=_again(course, fits))
-    course = replace(course, counted=_count_from_rest(course, course.best))
+    counted = _count_from_rest(course, course.best)
+    if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):
+        return course
+    course = replace(course, counted=counted)
     return replace(course, fits=_again(course, course.fits))
 
 
