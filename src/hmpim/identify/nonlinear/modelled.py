@@ -131,9 +131,11 @@ def linear_starts(
             starts[trial.fit.structure.name] = trial.fit.theta
     if _SERVOS[2] in starts:
         starts.setdefault(_SERVOS[1], starts[_SERVOS[2]])
-    limits = {"precision": PRECISION / plain.share, "hopeless": hopeless}
+    precision = PRECISION / plain.share
     servos = [
-        fit_structure(problem, STRUCTURES[name], starts[name], **limits)
+        fit_structure(
+            problem, STRUCTURES[name], starts[name], precision=precision, hopeless=hopeless
+        )
         for name in _SERVOS
         if name in starts and name in structures
     ]
