@@ -181,10 +181,12 @@ class _WithRows:
 
     def found(self) -> OutputFit:
         """The fit with hum and a drift, or without where it does not need them."""
-        joint = self.first.fits[self.asked]
+        joint, begun = self.first.fits[self.asked], self.begun
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
+        if self.humming is None:
+            self.begun = begun
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
         # Besides that asked, only inputs that the output follows are used to test for a drift.
