@@ -9,6 +9,7 @@ from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
+    PRECISION,
     almost_integrates,
     fit_integrating,
     fit_plain,
@@ -272,10 +273,11 @@ def _in_motion(course: Course) -> Counted | None:
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
-def _again(course: Course, fits: list[Fit]) -> list[Fit]:
+def _again(course: Course, fits: list[Fit], *, precision: float = PRECISION) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
-    return [fit for _, fit in refit_all(course.data, natural, course.counted)]
+    again = refit_all(course.data, natural, course.counted, precision=precision)
+    return [fit for _, fit in again]
 
 
 def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
@@ -306,12 +308,13 @@ def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
     data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
     seen = Counted(valid=problem.valid, begins=problem.begins)
     course = replace(course, data=data, counted=seen, settled=None)
-    course = replace(course, fits=_again(course, fits))
+    precision = PRECISION / min(fits, key=lambda fit: fit.objective).share
+    course = replace(course, fits=_again(course, fits, precision=precision))
     counted = _count_from_rest(course, course.best)
     if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):
         return course
     course = replace(course, counted=counted)
-    return replace(course, fits=_again(course, course.fits))
+    return replace(course, fits=_again(course, course.fits, precision=precision))
 
 
 def _count_from_rest(course: Course, fit: Fit) -> Counted:
