@@ -112,7 +112,7 @@ def is_explained(u: Real, joint: JointFit, *, floor: float) -> bool:
 def linear_starts(
     problem: Problem, plain: Fit, joint: JointFit, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Linear fits to which a nonlinearity may be added: the plain one, and those of a servo.
+    """Linear fits to which a nonlinearity may be added: the plain one, and better ones of a servo.
 
     A servo's lag makes a third pole, which a plain fit takes for delay, and commands of velocity
     and acceleration make zeros.
@@ -139,7 +139,7 @@ def linear_starts(
         for name in _SERVOS
         if name in starts and name in structures
     ]
-    return [plain, *servos]
+    return [plain, *(fit for fit in servos if fit.cost < plain.cost)]
 
 
 def kinds_in_question(
