@@ -23,6 +23,7 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
+from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -210,9 +211,12 @@ class _WithRows:
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        names = self.question.plain if plainly else self.question.structures
+        question, before = self.question, self.latest
+        names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = self._fitted(names, every)
+        if self.begun is not None and not plainly and before is not self.first:
+            self.latest = _as_before(question, self.begun, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -221,20 +225,15 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; a single input with fewer rows in the same structures again."""
+        """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             return fit_once(question, seen, names, rows, excluded=self.unrelated)
         known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
         if course is None or (course.data.noise is not None and len(rows) != known):
             course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-        elif len(rows) > known:
+        elif len(rows) != known:
             course = resumed(course, replace(course.problem, nuisance=rows), course.fits)
-        elif len(rows) < known:
-            joint = self.latest.fits[0]
-            fits = [trial.fit for trial in joint.trials if trial.intersample == course.natural]
-            course = replace(course, others=())
-            course = resumed(course, replace(joint.problem, nuisance=rows), fits)
         if course is not self.begun:
             self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
@@ -248,6 +247,22 @@ class _WithRows:
         hum = None if self.humming is None else self.humming.rows
         self.freed = _all_free(self.question, self.latest, self.asked, hum)
         return None if self.freed is None else self.freed.fits[self.asked]
+
+
+def _as_before(
+    question: Question, course: Course, before: OutputFit, found: OutputFit
+) -> OutputFit:
+    """The fit that a search with rows found, or the plainer dynamics found before if likelier.
+
+    A search may end in a large number of modes. The `course` has the plain fits with these rows.
+    """
+    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
+    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
+        return found
+    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
+    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
+    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
+    return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
 def _plain_beside_drift(
