@@ -14,8 +14,8 @@ from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.fits import counted_in, fit, fit_once, started
 from hmpim.identify.fitting.candidates import is_poor, spans_record
-from hmpim.identify.fitting.course import Course, completed, turn_ahead
-from hmpim.identify.fitting.data import polished, refit
+from hmpim.identify.fitting.course import Course, completed, resumed, turn_ahead
+from hmpim.identify.fitting.data import Counted, polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import hidden_pole
@@ -275,10 +275,10 @@ def _with_rows(
         attempts.append((replace(fitted, drifting=None), question.output.values, None))
     for other, y, rows in attempts:
         steady = replace(question, output=replace(question.output, values=y))
-        course = _plain(steady, seen, rows, fitted.begun)
+        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
+        course = _plain(steady, seen, leading, fitted.begun)
         problem = course.problem
         count = 1 - (joint.problem.fixed().shape[0] - problem.fixed().shape[0])
-        leading = replace(joint, problem=replace(joint.problem, y=y, nuisance=rows))
         command = Command(u=source.values, intersample=course.natural, others=others)
         starts = linear_starts(problem, course.best, joint, question.structures)
         kinds = kinds_in_question(command, problem, starts, joint.best.fit)
@@ -290,7 +290,7 @@ def _with_rows(
                 kind, command, problem, begun, leading, joint.problem, count, seen.rounding
             )
             if one is not None and left < TWICE * least:
-                beside = _fitted_with(steady, seen, problem, one)
+                beside = _fitted_with(steady, seen, course, one)
                 if beside.related:
                     gain = criterion_gain(beside, count, joint.best.fit, joint.problem)
                     yield gain, one, beside, other
@@ -304,10 +304,15 @@ def _with_rows(
 
 
 def _plain(
-    question: Question, seen: Imperfections, rows: Real | None, known: Course | None
+    question: Question, seen: Imperfections, joint: JointFit, known: Course | None
 ) -> Course:
-    """Plain fits of one input, which are `known` if the search began with the same data."""
-    if known is not None and rows is None:
+    """Plain fits of one input to the data of a joint fit; `known` are those without rows."""
+    rows = joint.problem.nuisance
+    if known is not None and rows is not None:
+        natural = [t.fit for t in joint.trials if t.intersample == known.natural]
+        fits = [fit for fit in natural if fit.structure.name in question.plain]
+        return resumed(known, joint.problem, fits)
+    if known is not None:
         counts, y = counted_in(question, seen), question.output.values
         if np.array_equal(known.data.y, y) and count_alike(known.given.valid, counts):
             return known
@@ -315,16 +320,16 @@ def _plain(
 
 
 def _fitted_with(
-    question: Question, seen: Imperfections, problem: Problem, one: NonlinearRow
+    question: Question, seen: Imperfections, course: Course, one: NonlinearRow
 ) -> JointFit:
-    """Fit every structure with a row for a nonlinearity."""
-    question = _counting(question, one)
-    course = completed(turn_ahead(started(question, seen, with_row(problem, one).nuisance)))
-    if one.within is None:
-        return chosen_of(course, question.structures)
-    own = polished(course.problem, one.within)
-    joint = chosen_of(replace(course, fits=[*course.fits, own]), question.structures)
-    return _in_own_dynamics(joint, own, course.natural)
+    """Fit every structure with a row for a nonlinearity; the `course` has plain fits without it."""
+    question, own = _counting(question, one), [] if one.within is None else [one.within]
+    given = Counted(valid=counted_in(question, seen), begins=None)
+    others = tuple(name for name in question.structures if name not in course.plain)
+    course = replace(course, given=given, others=others)
+    course = resumed(course, with_row(course.problem, one), [*course.fits, *own])
+    joint = chosen_of(course, question.structures)
+    return _in_own_dynamics(joint, own[0], course.natural) if own else joint
 
 
 def _in_own_dynamics(joint: JointFit, own: Fit, between: Intersample) -> JointFit:
@@ -357,8 +362,10 @@ def _likeliest(
     lead, led = best, former  # the likeliest fit so far, and its data
     for start in starts:
         for one in settled_rows(kind, command, problem, start):
-            leading = [(joint.problem, best)] if one.within is None else []
-            for before, begun in [(problem, start), *leading]:
+            begins = [(problem, one.within or start)]
+            if one.within is None:
+                begins.append((joint.problem, best))
+            for before, begun in begins:
                 data = with_row(before, one)
                 fit = refit(data, begun)
                 again = replace(joint, problem=data, best=replace(joint.best, fit=fit))

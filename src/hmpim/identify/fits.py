@@ -29,12 +29,14 @@ from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
     completed,
+    continue_between,
     continued,
     free_from_wander,
+    resumed,
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import follows
+from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
 from hmpim.identify.fitting.tail import hidden_tail
@@ -153,7 +155,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
-    return _WithRows(question, seen, fitted).found()
+    return _WithRows(question, seen, fitted, begun if isinstance(begun, Course) else None).found()
 
 
 class _WithRows:
@@ -163,7 +165,9 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
+    def __init__(
+        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
+    ) -> None:
         self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
@@ -171,17 +175,19 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
-        # The rows that were tried last, and plain fits of a single input with them
-        self.begun: tuple[Real, Course] | None = None
+        self.begun = begun  # fits of a single input, with the rows that were tried last
+        self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
     def found(self) -> OutputFit:
         """The fit with hum and a drift, or without where it does not need them."""
-        joint = self.first.fits[self.asked]
+        joint, begun = self.first.fits[self.asked], self.begun
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
+        if self.humming is None:
+            self.begun = begun
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
         # Besides that asked, only inputs that the output follows are used to test for a drift.
@@ -209,8 +215,8 @@ class _WithRows:
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = self._fitted(names, every)
-        if not self.several and not plainly and before is not self.first:
-            self.latest = _as_before(question, self.seen, every, before, self.latest)
+        if self.begun is not None and not plainly and before is not self.first:
+            self.latest = _as_before(question, self.begun, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -220,18 +226,20 @@ class _WithRows:
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
         """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
-        question, seen = self.question, self.seen
+        question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
-            known = self.latest.led if self.several else None
-            return fit_once(question, seen, names, rows, begun=known, excluded=self.unrelated)
-        if self.begun is None or not np.array_equal(self.begun[0], rows):
-            self.begun = (
-                rows,
-                completed(free_from_wander(turn_ahead(started(question, seen, rows)))),
-            )
-        course = self.begun[1]
+            led = self.latest.led if self.several else None
+            return fit_once(question, seen, names, rows, begun=led, excluded=self.unrelated)
+        known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
+        if course is None or (course.data.noise is not None and len(rows) != known):
+            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
+        elif len(rows) != known:
+            course = resumed(course, replace(course.problem, nuisance=rows), course.fits)
+        if course is not self.begun:
+            self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
-        return OutputFit(fits=(chosen_of(replace(course, others=others), names),))
+        joint = chosen_of(replace(course, others=others), names, fitted=self.between)
+        return OutputFit(fits=(joint,))
 
     def steadily(self, _: JointFit) -> JointFit | None:
         """The same dynamics of several inputs with a constant bias, from a state that is free."""
@@ -243,16 +251,15 @@ class _WithRows:
 
 
 def _as_before(
-    question: Question, seen: Imperfections, rows: Real, before: OutputFit, found: OutputFit
+    question: Question, course: Course, before: OutputFit, found: OutputFit
 ) -> OutputFit:
-    """The fit that a search with `rows` found, or the plainer dynamics found before if likelier.
+    """The fit that a search with rows found, or the plainer dynamics found before if likelier.
 
-    A search may end in a large number of modes.
+    A search may end in a large number of modes. The `course` has the plain fits with these rows.
     """
     (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
     if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
         return found
-    course = completed(turn_ahead(started(question, seen, rows)))
     again = refit_between(course.problem, best.fit, best.intersample, course.natural)
     joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
     gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)

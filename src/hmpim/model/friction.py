@@ -40,6 +40,8 @@ _PARTS = 256
 _FEWEST = 32
 """Steps that are at least computed at once."""
 
+_NONE = np.empty(0)
+
 _AT_REST = 1e-3
 """Speed below which a unit is at rest at the start, over its greatest."""
 
@@ -140,9 +142,8 @@ class _Unit:
         self.last = x.size - 1
         rates = rubbing.rates()
         self.speed = np.gradient(x, _STEP)
-        thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
-        self.pull = self._pull(rubbing, thrust)
-        self.known = np.stack([x, self.speed, thrust, self.pull], axis=1)
+        self.thrust = rubbing.inertia * np.gradient(self.speed, _STEP)  # w of the linear part
+        self.pull = self._pull(rubbing, self.thrust)
         within = _powers(scipy.linalg.expm(rates * (_STEP / _PARTS)), _PARTS)
         moved = _powers(within[_PARTS], _AHEAD)
         self.within: list[_Real] = list(within)  # a list is indexed faster
@@ -204,14 +205,13 @@ class _Unit:
         now = self.speed.item(at) + state.item(1)
         share = now / (now - beyond) if now * beyond < 0.0 else 0.0
         state = self._later(state, share)
-        x, speed, thrust, pull = self._between(at, share)
-        state[1] = -speed
-        z = x + state.item(0)
-        w = thrust + state.item(2) if self.lag else pull - z
+        state[1] = -_between(self.speed, at, share)
+        z, pull = _between(self.x, at, share) + state.item(0), _between(self.pull, at, share)
+        w = _between(self.thrust, at, share) + state.item(2) if self.lag else pull - z
         if abs(w) <= self.force:
             return self._stick(at + 1, w - (pull - z), z, 1.0 - share, state)
         if abs(w) <= self.most and at + 1 >= self.unsure:
-            self._doubt(at + 1, at + 1, w - (pull - z), z, 1.0 - share)
+            self._doubt(at + 1, _NONE, at + 1, w - (pull - z), z, 1.0 - share)
         state[-1] = self.force if w > 0.0 else -self.force
         return at + 1, self._later(state, 1.0 - share)
 
@@ -220,35 +220,45 @@ class _Unit:
     ) -> tuple[int, _Real]:
         """Hold the unit at z until w exceeds the friction; the rest as for `_held`."""
         first = at
-        at, now, before = self._held(first, first, excess, z, share, self.force)
+        at, now, before, sizes = self._held(first, first, excess, z, share, self.force)
         self.moves[first:at] = False
         if first >= self.unsure and self.most > self.force:
-            self._doubt(at, first, excess, z, share)
+            self._doubt(at, sizes, first, excess, z, share)
         np.subtract(z, self.x[first:at], out=self.effect[first:at])
         if at == self.x.size:
             return at, state
+        begin, passed, rest = at, 0.0, 0.0
         if at > first:
-            passed = (self.force - abs(before)) / (abs(now) - abs(before))
-            x, speed, thrust, _ = self._between(at - 1, passed)
-        else:
-            passed = 1.0
-            x, speed, thrust, _ = self.known[at].tolist()
+            begin, passed = at - 1, (self.force - abs(before)) / (abs(now) - abs(before))
+            rest = 1.0 - passed
         force = self.force if now > 0.0 else -self.force
-        state[0], state[1] = z - x, -speed
+        state[0] = z - _between(self.x, begin, passed)
+        state[1] = -_between(self.speed, begin, passed)
         if self.lag:
-            state[2] = force - thrust
+            state[2] = force - _between(self.thrust, begin, passed)
         state[-1] = force
-        return at, self._later(state, 1.0 - passed)
+        return at, self._later(state, rest)
 
-    def _doubt(self, at: int, first: int, excess: float, z: float, share: float) -> None:
-        """Steps from `at` on for which more friction would hold the unit; the rest as `_held`."""
-        self.unsure, _, _ = self._held(at, first, excess, z, share, self.most)
+    def _doubt(
+        self, at: int, sizes: _Real, first: int, excess: float, z: float, share: float
+    ) -> None:
+        """Steps from `at` on for which more friction would hold the unit.
+
+        `sizes` are |w| at the first of them, (m,); the rest is as for `_held`.
+        """
+        beyond = sizes > self.most
+        k = beyond.argmax().item() if sizes.size else 0
+        if sizes.size and beyond.item(k):
+            self.unsure = at + k
+        else:
+            late = at + sizes.size
+            self.unsure, *_ = self._held(late, first, excess, z, share, self.most)
         self.moves[at : self.unsure] = False
 
     def _held(
         self, at: int, first: int, excess: float, z: float, share: float, force: float
-    ) -> tuple[int, float, float]:
-        """Step from `at` on at which w exceeds a force, and w there and before.
+    ) -> tuple[int, float, float, _Real]:
+        """Step from `at` on at which w exceeds a force, w there and before, and |w| from there on.
 
         The unit is held at z since `first`, `excess` is w beyond what it tended to then, and
         `share` the part of a step that had passed. The number of steps if w never exceeds it.
@@ -258,23 +268,25 @@ class _Unit:
             w = self.pull[at : at + ahead] - z
             if excess:
                 w += excess * self.fades ** (at - first + share + np.arange(w.size))
-            beyond = np.abs(w) > force
+            sizes = np.abs(w)
+            beyond = sizes > force
             k = beyond.argmax().item()
             if beyond.item(k):
-                return at + k, w.item(k), w.item(k - 1) if k else before
+                return at + k, w.item(k), w.item(k - 1) if k else before, sizes[k:]
             at += w.size
             ahead, before = 2 * ahead, w.item(-1)
-        return at, 0.0, before
-
-    def _between(self, at: int, share: float) -> list[float]:
-        """The linear part's position, speed and thrust, and the pull, a share of a step later."""
-        now, then = self.known[at : at + 2].tolist()
-        return [a + share * (b - a) for a, b in zip(now, then, strict=True)]
+        return at, 0.0, before, _NONE
 
     def _later(self, state: _Real, share: float) -> _Real:
         """The state after a share of a step."""
         later: _Real = self.within[round(share * _PARTS)].dot(state)
         return later
+
+
+def _between(values: _Real, at: int, share: float) -> float:
+    """Value a share of a step later."""
+    now: float = values.item(at)
+    return now + share * (values.item(at + 1) - now) if share else now
 
 
 def _powers(step: _Real, most: int) -> _Real:

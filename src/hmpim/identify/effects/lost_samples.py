@@ -64,11 +64,12 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
         residual = np.where(clipped, np.median(counted), residual)
     around = sliding_window_view(np.pad(residual, _WINDOW // 2, mode="reflect"), _WINDOW)
     level = np.median(around, axis=1)
-    spread = np.median(np.abs(around - level[:, None]), axis=1) / BULK
-    away = np.abs(residual - level)
+    distance = np.abs(residual - level)
     motion = np.ptp(sliding_window_view(np.pad(prediction, 1, mode="edge"), 3), axis=1)
     # A late sample differs by its motion at most, and is no spike.
-    away = away > np.maximum(TWICE * DEVIATIONS * np.maximum(spread, 0.5 * bulk), motion)
+    away = distance > np.maximum(TWICE * DEVIATIONS * 0.5 * bulk, motion)
+    spread = np.median(np.abs(around[away] - level[away, None]), axis=1) / BULK
+    away[away] = distance[away] > TWICE * DEVIATIONS * spread
     for a, b in zip(*runs_of(away), strict=True):
         if b - a > _LONGEST_SPIKE:
             away[a:b] = False

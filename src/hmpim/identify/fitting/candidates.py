@@ -20,7 +20,7 @@ from hmpim.identify.fitting.enrich import (
     with_fit,
     without_fast,
 )
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, bounded_for, fit_structure
 from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import is_all_behind_hold, steps_through
 from hmpim.identify.fitting.modes import grown_modes
@@ -34,6 +34,7 @@ from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 
 __all__ = [
+    "PRECISION",
     "almost_integrates",
     "best_of",
     "fit_integrating",
@@ -59,8 +60,8 @@ _AT_ONCE = 4
 _SLIPS = 4
 """Half periods by which the delay of a fit in mid-motion is moved either way for new starts."""
 
-_PRECISION = 1e-2
-"""Precision of a fit that is compared with others, see `fit_structure`."""
+PRECISION = 1e-2
+"""Precision of a fit that is compared with others, over its share of independent samples."""
 
 
 def fit_plain(
@@ -121,7 +122,7 @@ def fit_plain(
 
     def ended(fit: Fit) -> Fit:
         if fit.objective <= TWICE**2 * least:
-            limits = {"precision": _PRECISION / fit.share, "hopeless": largest}
+            limits = {"precision": PRECISION / fit.share, "hopeless": largest}
             return fit if fit.converged else refit(problem, fit, **limits)
         if not fit.prediction.size:
             return fit
@@ -131,8 +132,12 @@ def fit_plain(
 
 
 def _tasted(problem: Problem, starts: Sequence[Real], best: Fit, largest: float) -> Fit:
-    """The best of a fit and of a few steps from each other promising start."""
-    for theta in starts:
+    """The best of a fit and of a few steps from each other promising start.
+
+    Starts beyond the bounds may be the same one within them.
+    """
+    within = [bounded_for(problem, best.structure, theta) for theta in starts]
+    for theta in {theta.tobytes(): theta for theta in within}.values():
         hopeless = min(TWICE * best.objective, largest)
         rival = fit_structure(problem, best.structure, theta, iterations=TASTE, hopeless=hopeless)
         best = min(best, rival, key=lambda fit: fit.objective)
@@ -367,7 +372,7 @@ def best_of(
     samples are independent; the precision refers to these.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
-    precision = _PRECISION / leading.share
+    precision = PRECISION / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     count = problem.counted * leading.share
     price = float(np.log(count)) / count

@@ -4,11 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, every_of, median
+from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
+    PRECISION,
     almost_integrates,
     fit_integrating,
     fit_plain,
@@ -45,6 +46,7 @@ __all__ = [
     "free_from_wander",
     "is_unanswered",
     "looks_held",
+    "resumed",
     "start",
     "turn_ahead",
 ]
@@ -272,10 +274,11 @@ def _in_motion(course: Course) -> Counted | None:
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
-def _again(course: Course, fits: list[Fit]) -> list[Fit]:
+def _again(course: Course, fits: list[Fit], *, precision: float = PRECISION) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
-    return [fit for _, fit in refit_all(course.data, natural, course.counted)]
+    again = refit_all(course.data, natural, course.counted, precision=precision)
+    return [fit for _, fit in again]
 
 
 def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
@@ -293,6 +296,32 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
+
+
+def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
+    """Fit structures to other data of the same input, each from where its fit ended.
+
+    `problem` has the output, the rows and the samples that count.
+    """
+    y, lag = _level(problem.y, problem.nuisance, problem.valid), course.data.rough.lag
+    ahead = lag if lag < 0 else None
+    rough = rough_response(course.data.u, y, longest_delay=longest_lag(y.size), lag=ahead)
+    data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
+    seen = Counted(valid=problem.valid, begins=problem.begins)
+    course = replace(course, data=data, counted=seen, settled=None)
+    precision = PRECISION / min(fits, key=lambda fit: fit.objective).share
+    course = replace(course, fits=_again(course, fits, precision=precision))
+    counted = _count_from_rest(course, course.best)
+    if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):
+        return course
+    course = replace(course, counted=counted)
+    return replace(course, fits=_again(course, course.fits, precision=precision))
+
+
+def _count_from_rest(course: Course, fit: Fit) -> Counted:
+    """Samples that count by a fit that begins at rest: the record may or may not."""
+    from_rest = refit(course.data.problem(course.natural, course.given), fit)
+    return count_in(course.data, course.natural, [from_rest], course.given, course.known)
 
 
 def continue_between(course: Course) -> Fits:
@@ -335,8 +364,7 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
         return course, fitted
     if course.counted.begins is not None:
         leading = min(richer, key=lambda f: f.objective)
-        from_rest = refit(data.problem(course.natural, course.given), leading)
-        resting = count_in(data, course.natural, [from_rest], course.given, course.known)
+        resting = _count_from_rest(course, leading)
         # If it is at rest after all, the structure was wrong, and not the beginning.
         at_rest = resting.begins is None
         counted = resting if at_rest else begin_later(course.counted, leading)

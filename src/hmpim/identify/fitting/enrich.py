@@ -115,8 +115,10 @@ def proposals(
         errors, denominators = reweighted(rough, structure, delays)
         powers = np.concatenate([np.arange(1, order + 1) for order in structure.sections])
         for i in np.argsort(errors):
+            if len(starts) == 5:
+                break
             coefficients = _sections(denominators[i], structure)
-            if coefficients is not None and len(starts) < 5:
+            if coefficients is not None:
                 theta = theta_of(structure, coefficients / rough.omega[-1] ** powers)
                 starts.append(np.append(delays[i], theta))
         if starts:

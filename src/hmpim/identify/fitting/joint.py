@@ -143,13 +143,18 @@ def _likeliest(found: Mapping[int, JointFit]) -> tuple[int, JointFit]:
 
 
 def chosen_of(
-    course: Course, structures: tuple[StructureName, ...], *, growing: bool = True
+    course: Course,
+    structures: tuple[StructureName, ...],
+    *,
+    growing: bool = True,
+    fitted: Fits | None = None,
 ) -> JointFit:
     """Finish the search once the plain structures are fitted to the samples that count.
 
-    The course has the plain fits under the natural assumption; the rest is as for `joint_fit`.
+    The course has the plain fits under the natural assumption, and `fitted`, if known, those under
+    each assumption; the rest is as for `joint_fit`.
     """
-    fitted = continue_between(course)
+    fitted = fitted or continue_between(course)
     if is_unanswered(course, fitted):
         return give_up(course, fitted)
     course, fitted = enrich(course, fitted)
@@ -359,20 +364,16 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
         return []
     most = np.inf if leading.zeros else leading.parameters
     known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
-    found = []
+    found: list[Trial] = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
-        structure = trial.fit.structure
+        structure, mode = trial.fit.structure, trial.intersample
         if structure in known or not may_be_fed_forward(structure) or structure.parameters > most:
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
+        hopeless = TWICE * best.objective
         fit = refit_between(
-            problem,
-            trial.fit,
-            trial.intersample,
-            "feedforward",
-            iterations=40,
-            hopeless=TWICE * best.objective,
+            problem, trial.fit, mode, "feedforward", iterations=40, hopeless=hopeless
         )
         found.append(trial_of("feedforward", fit, count))
     return found

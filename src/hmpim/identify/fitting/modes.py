@@ -64,9 +64,13 @@ def grown_modes(
     rough = condensed(data.rough)
     found: dict[Structure, Fit] = {}
     for known in (False, True) if structures else ():
-        before = np.inf
-        for structure, start in _grown(rough, delay, memory, structures, known=known).items():
-            fit = fit_structure(problem, structure, start, iterations=_TASTE, hopeless=hopeless)
+        before, grown = np.inf, _grown(rough, delay, memory, structures, known=known)
+        begun = [fit_structure(problem, s, start, iterations=0) for s, start in grown.items()]
+        # Beside what more modes leave even before they are fitted, fewer may have no chance.
+        least = min([hopeless, *(TWICE * fit.objective for fit in begun)])
+        for fit in begun:
+            structure = fit.structure
+            fit = fit_structure(problem, structure, fit.theta, iterations=_TASTE, hopeless=least)
             found[structure] = min(fit, found.get(structure, fit), key=lambda f: f.objective)
             if fit.is_white or fit.objective > (1.0 - PART) * before:
                 break

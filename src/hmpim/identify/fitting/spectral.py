@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Complex, Mask, Real
+from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.start import RoughResponse, distinct
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
@@ -81,21 +81,24 @@ def fitted_roughly(
     The rough response is best `condensed`. The delay stays if it is `held`. At most so many
     `steps` are taken.
     """
-    now = _Rough(rough, structure, thetas)
-    damping = np.full(len(thetas), 1e-3)
+    model = _Rough(rough, structure)
+    errors, (normal, moment) = model.errors(thetas), model.normal()
+    thetas, damping = thetas.copy(), np.full(len(thetas), 1e-3)
     for _ in range(steps):
-        step = now.steps(damping) * (np.arange(thetas.shape[1]) >= held)
-        then = _Rough(rough, structure, _bounded(structure, now.thetas + step))
-        better = then.errors < now.errors
-        still = ~(now.errors - then.errors > _STILL * now.errors)
+        step = _damped(normal, moment, damping) * (np.arange(thetas.shape[1]) >= held)
+        moved = _bounded(structure, thetas + step)
+        then = model.errors(moved)
+        better, still = then < errors, ~(errors - then > _STILL * errors)
         damping = np.where(better, damping / _FACTOR, damping * _FACTOR)
-        now = then.unless(better, now)
+        thetas[better], errors[better] = moved[better], then[better]
         if np.all(still & (better | (damping > _FACTOR))):
             break
-    least = float(now.errors.min())
-    order = [i for i in np.argsort(now.errors) if now.errors[i] <= TWICE * least]
+        for own, new in zip((normal, moment), model.normal(), strict=True):
+            own[better] = new[better]
+    least = float(errors.min())
+    order = [i for i in np.argsort(errors) if errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)
-    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(now.thetas[order])))
+    return RoughFits(error=least / (power or 1.0), likely=np.array(distinct(thetas[order])))
 
 
 def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tuple[Real, Real]:
@@ -140,49 +143,52 @@ def reweighted(rough: RoughResponse, structure: Structure, delays: Real) -> tupl
 
 def residual_of(rough: RoughResponse, structure: Structure, theta: Real) -> RoughResponse:
     """Residual of a rough response for a structure at given parameters, (1 + order,)."""
-    weighted = _Rough(rough, structure, theta[None]).residuals[0].view(np.complex128)
+    model = _Rough(rough, structure)
+    model.errors(theta[None])
+    weighted = model.residuals[0].view(np.complex128)
     response = np.asarray(weighted / np.sqrt(rough.weight), dtype=np.complex128)
     return replace(rough, response=response)
 
 
 class _Rough:
-    """Responses of one structure at several parameters, the numerators solved for."""
+    """Responses of one structure at the latest parameters, the numerators solved for."""
 
-    def __init__(self, rough: RoughResponse, structure: Structure, thetas: Real) -> None:
-        self.rough, self.structure, self.thetas = rough, structure, thetas
-        root = np.sqrt(rough.weight)
+    def __init__(self, rough: RoughResponse, structure: Structure) -> None:
+        self.structure, self._lag, self._root = structure, rough.lag, np.sqrt(rough.weight)
         s = self._s = np.asarray(1j * rough.omega, dtype=np.complex128)
-        late = np.exp(-s * (thetas[:, :1] - rough.lag)) * root
+        self._target = _real(rough.response * self._root)
+        self._scaled = s * (1.0 / rough.omega[-1])
+        powers = np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
+        self._powers = None if structure.parallel else self._scaled**powers
+
+    def errors(self, thetas: Real) -> Real:
+        """Squared errors at several parameters, (k, 1 + order): shape (k,)."""
+        s, structure, target = self._s, self.structure, self._target
+        late = np.exp(-s * (thetas[:, :1] - self._lag)) * self._root
         self._sections = _sections(structure, thetas, s)
         below = [1.0 / section for section, _ in self._sections]
-        scale = 1.0 / rough.omega[-1]
-        if structure.parallel:
+        if self._powers is not None:
+            rows = math.prod(below, start=late)[:, None, :] * self._powers
+        else:
             rows = np.stack([late * each for each in below], axis=1)
             if structure.zeros == structure.order - 1:
-                rows = np.concatenate([rows, rows * (s * scale)], axis=1)
-        else:
-            whole = math.prod(below, start=late)
-            powers = (s * scale) ** np.arange(structure.dc_zeros, structure.zeros + 1)[:, None]
-            rows = whole[:, None, :] * powers
+                rows = np.concatenate([rows, rows * self._scaled], axis=1)
         self._rows = rows
         self._real = _real(rows)
-        target = _real(rough.response * root)
         self._gram = _ridged(self._real @ self._real.swapaxes(1, 2))
         self.linear = np.linalg.solve(self._gram, self._real @ target[:, None])[..., 0]
         self.residuals = target - (self.linear[:, None, :] @ self._real)[:, 0]
         errors = np.vecdot(self.residuals, self.residuals)
-        self.errors = np.where(np.isfinite(errors), errors, np.inf)
+        return np.asarray(np.where(np.isfinite(errors), errors, np.inf))
 
-    def steps(self, damping: Real) -> Real:
-        """Steps of all parameters, shape (k, 1 + order)."""
-        s, count = self._s, len(self._sections)
-        linear = self.linear[..., None]
-        whole = (linear * self._rows).sum(axis=1)
-        slopes = [-s * whole]
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations of all parameters: (k, 1 + order, 1 + order) and (k, 1 + order)."""
+        count = len(self._sections)
+        moved = self.linear[..., None] * self._rows
+        whole = moved.sum(axis=1)
+        slopes = [-self._s * whole]
         for k, (section, factors) in enumerate(self._sections):
-            own = whole
-            if self.structure.parallel:
-                own = (linear * self._rows)[:, k::count].sum(axis=1)
+            own = moved[:, k::count].sum(axis=1) if self.structure.parallel else whole
             slopes += [-own * factor / section for factor in factors]
         rows = _real(np.stack(slopes, axis=1))
         mixed = rows @ self._real.swapaxes(1, 2)
@@ -190,21 +196,18 @@ class _Rough:
         # For a direction that the numerator explains fully, only rounding remains, of either sign.
         least = np.finfo(float).eps * np.einsum("kii->ki", normal) + np.finfo(float).tiny
         normal -= mixed @ np.linalg.solve(self._gram, mixed.swapaxes(1, 2))
-        moment = rows @ self.residuals[..., None]
-        diagonal = np.maximum(np.einsum("kii->ki", normal), least)
-        scale = np.sqrt(diagonal)
-        scaled = normal / (scale[:, :, None] * scale[:, None, :])
-        scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
-        found = np.linalg.solve(scaled, moment / scale[..., None])[..., 0] / scale
-        return np.asarray(np.where(np.isfinite(found), found, 0.0))
+        diagonal = np.einsum("kii->ki", normal)
+        diagonal[:] = np.maximum(diagonal, least)
+        return normal, (rows @ self.residuals[..., None])[..., 0]
 
-    def unless(self, better: Mask, before: "_Rough") -> "_Rough":
-        """The same, with the state before where this one is not better."""
-        if not better.all():
-            for name in ("thetas", "errors", "_rows", "_real", "_gram", "linear", "residuals"):
-                getattr(self, name)[~better] = getattr(before, name)[~better]
-            self._sections = _sections(self.structure, self.thetas, self._s)
-        return self
+
+def _damped(normal: Real, moment: Real, damping: Real) -> Real:
+    """Steps of all parameters, shape (k, 1 + order)."""
+    scale = np.sqrt(np.einsum("kii->ki", normal))
+    scaled = normal / (scale[:, :, None] * scale[:, None, :])
+    scaled += (damping[:, None, None] + _LEAST) * np.eye(scale.shape[1])
+    found = np.linalg.solve(scaled, (moment / scale)[..., None])[..., 0] / scale
+    return np.asarray(np.where(np.isfinite(found), found, 0.0))
 
 
 def _real(rows: Complex) -> Real:
@@ -213,9 +216,10 @@ def _real(rows: Complex) -> Real:
 
 
 def _ridged(gram: Real) -> Real:
-    """The same with its diagonal raised by about its rounding error."""
-    diagonal = np.maximum(np.einsum("kii->ki", gram), np.finfo(float).tiny)
-    return np.asarray(gram + _LEAST * diagonal[:, :, None] * np.eye(gram.shape[-1]))
+    """The same matrices, their diagonals raised by about their rounding error."""
+    diagonal = np.einsum("kii->ki", gram)
+    diagonal += _LEAST * np.maximum(diagonal, np.finfo(float).tiny)
+    return gram
 
 
 def _sections(

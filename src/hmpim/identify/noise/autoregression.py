@@ -153,7 +153,8 @@ def yule_walker(residual: Real, longest: int = LONGEST) -> tuple[Real, float]:
 
 def spectrum_of_filter(noise: Real, omega: Real) -> Real:
     """Power spectrum of noise that a filter whitens to a power of 1, at radians per sample."""
-    return np.asarray(np.abs(np.exp(-1j * np.outer(omega, np.arange(noise.size))) @ noise) ** -2)
+    turns = np.exp(-1j * omega)
+    return np.asarray(np.abs(np.polynomial.polynomial.polyval(turns, noise)) ** -2)
 
 
 def autoregressive_spectrum(residual: Real, omega: Real) -> Real:

@@ -10,6 +10,7 @@ Cambridge Phil. Soc. 44, 1948), for any input; the same regression gives how far
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy
@@ -36,7 +37,7 @@ from hmpim.identify.worth import MATERIAL, PART, WORTH
 from hmpim.model.nonlinear import Kind
 from hmpim.model.operators import rate_limited
 from hmpim.model.poles import rational_response
-from hmpim.model.sampled import prepare_input
+from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
 __all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead", "plainer_bends"]
@@ -231,20 +232,26 @@ def _shortened(
 
 def _at_the_input(u: Real, fit: Fit, intersample: Intersample) -> Iterator[Hypothesis]:
     """Traces in the output of a dead zone or a rate limit of the command."""
-    largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
-    inside = [-np.clip(u, -half * largest, half * largest) for half in _DEAD]
-    rates = RATES[_EVERY::2]
-    bent = np.stack([*inside, *(rate_limited(u, rate * fastest) - u for rate in rates)])
-    first = bent[:, :1]
-    # A trace is only detected, not measured: its spline need be no finer than the samples.
-    source = prepare_input(bent - first, intersample, precision=np.inf)
+    source, first = _bent(u, intersample)
     traces = rational_response(
         source, delay=fit.delay, numerator=fit.numerator, denominator=fit.denominator
     )
     if fit.structure.integrators:
         traces += fit.linear[0] * first * np.maximum(np.arange(u.size) - fit.delay, 0.0)
     for i, trace in enumerate(traces):
-        yield Hypothesis(kind="dead_zone" if i < len(inside) else "rate_limit", trace=trace)
+        yield Hypothesis(kind="dead_zone" if i < len(_DEAD) else "rate_limit", trace=trace)
+
+
+@partial(kept, long=True)
+def _bent(u: Real, intersample: Intersample) -> tuple[SampledInput, Real]:
+    """What a dead zone or a rate limit adds to a command, and the first sample of that."""
+    largest, fastest = float(np.max(np.abs(u))), float(np.max(np.abs(np.diff(u))))
+    inside = [-np.clip(u, -half * largest, half * largest) for half in _DEAD]
+    rates = RATES[_EVERY::2]
+    bent = np.stack([*inside, *(rate_limited(u, rate * fastest) - u for rate in rates)])
+    first = bent[:, :1]
+    # A trace is only detected, not measured: its spline need be no finer than the samples.
+    return prepare_input(bent - first, intersample, precision=np.inf), first
 
 
 def _scored(slopes: Real, traces: Real, residual: Real) -> tuple[Real, Real, Real]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.fitting.candidates import PRECISION
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
@@ -111,7 +112,7 @@ def is_explained(u: Real, joint: JointFit, *, floor: float) -> bool:
 def linear_starts(
     problem: Problem, plain: Fit, joint: JointFit, structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Linear fits to which a nonlinearity may be added: the plain one, and those of a servo.
+    """Linear fits to which a nonlinearity may be added: the plain one, and better ones of a servo.
 
     A servo's lag makes a third pole, which a plain fit takes for delay, and commands of velocity
     and acceleration make zeros.
@@ -130,12 +131,15 @@ def linear_starts(
             starts[trial.fit.structure.name] = trial.fit.theta
     if _SERVOS[2] in starts:
         starts.setdefault(_SERVOS[1], starts[_SERVOS[2]])
+    precision = PRECISION / plain.share
     servos = [
-        fit_structure(problem, STRUCTURES[name], starts[name], hopeless=hopeless)
+        fit_structure(
+            problem, STRUCTURES[name], starts[name], precision=precision, hopeless=hopeless
+        )
         for name in _SERVOS
         if name in starts and name in structures
     ]
-    return [plain, *servos]
+    return [plain, *(fit for fit in servos if fit.cost < plain.cost)]
 
 
 def kinds_in_question(

@@ -35,7 +35,7 @@ from hmpim.model.friction import Rubbing, rubbed
 from hmpim.model.nonlinear import Kind, Place
 from hmpim.model.operators import gap_crossed, play, power_of, pushed
 from hmpim.model.response import per_step
-from hmpim.model.sampled import prepare_input
+from hmpim.model.sampled import MARGIN, prepare_input
 from hmpim.record import Intersample
 
 __all__ = [
@@ -102,14 +102,18 @@ def linear_part(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
 def linear_part_finely(problem: Problem, fit: Fit, others: Real | None = None) -> Real:
     """The same on the finer clock."""
     steps = np.arange(FINE)[:, None] * np.eye(1, fit.theta.size) / FINE
-    parts = [part_of(problem, fit.structure, fit.theta - step) for step in steps]
+    driving = replace(problem, begins=None)
+    parts = [part_of(driving, fit.structure, fit.theta - step) for step in steps]
     driven = np.stack([part.driven(fit.linear[:-1]) for part in parts], axis=1)
     rest = np.zeros(driven.shape[0]) if others is None else others
     if fit.initial.size:
-        rest = linear_part(problem, fit, others) - driven[:, 0]
-    if rest.any():
-        at = np.arange(rest.size)
-        driven += scipy.interpolate.CubicSpline(at, rest)(at[:, None] + np.arange(FINE) / FINE)
+        rest = rest + fit.initial @ part_of(problem, fit.structure, fit.theta).free
+    moves = np.flatnonzero(rest)
+    if moves.size:
+        here = slice(max(moves[0] - MARGIN, 0), moves[-1] + 1 + MARGIN)
+        at = np.arange(rest.size)[here]
+        spline = scipy.interpolate.CubicSpline(at, rest[here])
+        driven[here] += spline(at[:, None] + np.arange(FINE) / FINE)
     return joined(driven)
 
 
