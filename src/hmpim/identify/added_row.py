@@ -311,7 +311,7 @@ def _plain(
     if known is not None and rows is not None:
         natural = [t.fit for t in joint.trials if t.intersample == known.natural]
         fits = [fit for fit in natural if fit.structure.name in question.plain]
-        return resumed(known, joint.problem, fits)
+        return resumed(known, joint.problem, fits or known.fits)
     if known is not None:
         counts, y = counted_in(question, seen), question.output.values
         if np.array_equal(known.data.y, y) and count_alike(known.given.valid, counts):

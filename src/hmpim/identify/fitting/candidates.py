@@ -20,7 +20,7 @@ from hmpim.identify.fitting.enrich import (
     with_fit,
     without_fast,
 )
-from hmpim.identify.fitting.fit import Fit, Problem, bounded_for, fit_structure
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, bounded_for, fit_structure
 from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import is_all_behind_hold, steps_through
 from hmpim.identify.fitting.modes import grown_modes
@@ -34,7 +34,6 @@ from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 from hmpim.model.response import slowest_time_constant
 
 __all__ = [
-    "PRECISION",
     "almost_integrates",
     "best_of",
     "fit_integrating",
@@ -59,9 +58,6 @@ _AT_ONCE = 4
 
 _SLIPS = 4
 """Half periods by which the delay of a fit in mid-motion is moved either way for new starts."""
-
-PRECISION = 1e-2
-"""Precision of a fit that is compared with others, over its share of independent samples."""
 
 
 def fit_plain(
@@ -122,7 +118,7 @@ def fit_plain(
 
     def ended(fit: Fit) -> Fit:
         if fit.objective <= TWICE**2 * least:
-            limits = {"precision": PRECISION / fit.share, "hopeless": largest}
+            limits = {"precision": CONVERGED / fit.share, "hopeless": largest}
             return fit if fit.converged else refit(problem, fit, **limits)
         if not fit.prediction.size:
             return fit
@@ -372,7 +368,7 @@ def best_of(
     samples are independent; the precision refers to these.
     """
     leading = min(rivals, key=lambda fit: fit.objective)
-    precision = PRECISION / leading.share
+    precision = CONVERGED / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     count = problem.counted * leading.share
     price = float(np.log(count)) / count

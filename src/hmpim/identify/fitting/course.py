@@ -9,7 +9,6 @@ from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
-    PRECISION,
     almost_integrates,
     fit_integrating,
     fit_plain,
@@ -21,7 +20,7 @@ from hmpim.identify.fitting.candidates import (
 )
 from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
-from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.second_zero import with_second_zero
@@ -274,7 +273,7 @@ def _in_motion(course: Course) -> Counted | None:
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
-def _again(course: Course, fits: list[Fit], *, precision: float = PRECISION) -> list[Fit]:
+def _again(course: Course, fits: list[Fit], *, precision: float = CONVERGED) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
     again = refit_all(course.data, natural, course.counted, precision=precision)
@@ -309,7 +308,7 @@ def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
     data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
     seen = Counted(valid=problem.valid, begins=problem.begins)
     course = replace(course, data=data, counted=seen, settled=None)
-    precision = PRECISION / min(fits, key=lambda fit: fit.objective).share
+    precision = CONVERGED / min(fits, key=lambda fit: fit.objective).share
     course = replace(course, fits=_again(course, fits, precision=precision))
     counted = _count_from_rest(course, course.best)
     if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):

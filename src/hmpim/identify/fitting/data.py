@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, SEARCHED
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse, rough_response
@@ -159,7 +159,12 @@ def polished(problem: Problem, fit: Fit) -> Fit:
 
 
 def refit_all(
-    data: Data, fitted: Fits, seen: Counted, *, hopeful: float = np.inf, precision: float = 1e-2
+    data: Data,
+    fitted: Fits,
+    seen: Counted,
+    *,
+    hopeful: float = np.inf,
+    precision: float = CONVERGED,
 ) -> Fits:
     """Fit all structures to other data, from where they ended, the leading one first.
 
@@ -192,6 +197,8 @@ def hopeless_beside(structure: Structure, rivals: list[Fit]) -> float:
     return min([TWICE * least, *white])
 
 
-def refit(problem: Problem, fit: Fit, *, precision: float = 1e-2, hopeless: float = np.inf) -> Fit:
+def refit(
+    problem: Problem, fit: Fit, *, precision: float = CONVERGED, hopeless: float = np.inf
+) -> Fit:
     """Fit the same structure to other data, from where it ended, as `fit_structure` does."""
     return fit_structure(problem, fit.structure, fit.theta, precision=precision, hopeless=hopeless)

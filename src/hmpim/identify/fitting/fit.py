@@ -28,6 +28,7 @@ from hmpim.model.response import slowest_time_constant
 from hmpim.model.sampled import SAMPLES_ALONE
 
 __all__ = [
+    "CONVERGED",
     "FORGETS",
     "Evaluation",
     "Fit",
@@ -50,6 +51,11 @@ _SHAPES = (1e-4, 1e6)
 
 _CRITICAL = 0.25
 """1 / (4ζ²) at critical damping, above which poles oscillate."""
+
+CONVERGED = 1e-2
+"""Decrease of the sum of squares, in units of σ², below which a step ends a fit that is compared
+with others. If only a share of the samples is independent, it is divided by that share.
+"""
 
 FORGETS = 5.0
 """Time constants after which a state is forgotten (0.7 % remains)."""
@@ -322,7 +328,7 @@ def fit_structure(
     theta: Real,
     *,
     iterations: int = 40,
-    precision: float = 1e-2,
+    precision: float = CONVERGED,
     hopeless: float = np.inf,
 ) -> Fit:
     """Fit one structure from one start.
@@ -343,7 +349,7 @@ def fit_together(
     thetas: Sequence[Real],
     *,
     iterations: int = 40,
-    precision: float = 1e-2,
+    precision: float = CONVERGED,
     hopeless: float = np.inf,
 ) -> list[Fit]:
     """Fit one output to several inputs at once, each with a structure and a start of its own.

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.fitting.candidates import PRECISION
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import UNSEEN
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
@@ -131,7 +130,7 @@ def linear_starts(
             starts[trial.fit.structure.name] = trial.fit.theta
     if _SERVOS[2] in starts:
         starts.setdefault(_SERVOS[1], starts[_SERVOS[2]])
-    precision = PRECISION / plain.share
+    precision = CONVERGED / plain.share
     servos = [
         fit_structure(
             problem, STRUCTURES[name], starts[name], precision=precision, hopeless=hopeless

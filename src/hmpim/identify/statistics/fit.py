@@ -15,7 +15,7 @@ import scipy
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.climb import climb
-from hmpim.identify.fitting.fit import Fit, bounded_for, evaluating
+from hmpim.identify.fitting.fit import CONVERGED, Fit, bounded_for, evaluating
 from hmpim.identify.fitting.held_steps import in_whole_samples, is_all_behind_hold
 from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
@@ -38,9 +38,6 @@ then moves by half a standard deviation at most, and the error is of second orde
 
 _CLOSE = 4.0
 """The same where no other evaluation is allowed: two standard deviations."""
-
-_PRECISION = 1e-2
-"""Precision of a fit whose evaluations are limited, see `fit_structure`."""
 
 _ROUNDED = 1e-13
 """Share of the output's power below which the residual is the rounding of sums."""
@@ -347,7 +344,7 @@ def _climbed(here: _Evaluation, evaluations: int) -> Fitted:
             bounded=lambda thetas: [bounded_for(problem, structure, theta) for theta in thetas],
             counted=problem.counted,
             iterations=evaluations,
-            precision=_PRECISION,
+            precision=CONVERGED,
         )
     except _SpentError:
         best, converged = min(made, key=lambda evaluation: evaluation.cost), False
