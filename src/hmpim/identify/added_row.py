@@ -322,12 +322,19 @@ def _plain(
 def _fitted_with(
     question: Question, seen: Imperfections, course: Course, one: NonlinearRow
 ) -> JointFit:
-    """Fit every structure with a row for a nonlinearity; the `course` has plain fits without it."""
+    """Fit every structure with a row for a nonlinearity; the `course` has plain fits without it.
+
+    They are started anew unless they leave white noise: the row may explain what they followed.
+    """
     question, own = _counting(question, one), [] if one.within is None else [one.within]
     given = Counted(valid=counted_in(question, seen), begins=None)
     others = tuple(name for name in question.structures if name not in course.plain)
-    course = replace(course, given=given, others=others)
-    course = resumed(course, with_row(course.problem, one), [*course.fits, *own])
+    course, data = replace(course, given=given, others=others), with_row(course.problem, one)
+    course = resumed(course, data, [*course.fits, *own])
+    if not course.best.is_white:
+        course = completed(turn_ahead(started(question, seen, data.nuisance)))
+        fits = [*course.fits, *(polished(course.problem, fit) for fit in own)]
+        course = replace(course, fits=fits)
     joint = chosen_of(course, question.structures)
     return _in_own_dynamics(joint, own[0], course.natural) if own else joint
 

@@ -175,7 +175,7 @@ class _WithRows:
         self.latest = fitted  # with the rows that were tried last
         self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
-        self.begun = begun  # fits of a single input, with the rows that were tried last
+        self.begun = begun  # plain fits of a single input, at first without rows
         self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
@@ -186,8 +186,8 @@ class _WithRows:
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
-        if self.humming is None:
-            self.begun = begun
+        if self.humming is None:  # as if it had not been tried
+            self.begun, self.between, self.latest = begun, [], self.first
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
         # Besides that asked, only inputs that the output follows are used to test for a drift.
@@ -225,17 +225,14 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for equal rows."""
+        """Fit all inputs with rows; plain fits of a single input are made once for as many rows."""
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
-            led = self.latest.led if self.several else None
+            led = self.latest.led
             return fit_once(question, seen, names, rows, begun=led, excluded=self.unrelated)
         known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
-        if course is None or (course.data.noise is not None and len(rows) != known):
-            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-        elif len(rows) != known:
-            course = resumed(course, replace(course.problem, nuisance=rows), course.fits)
-        if course is not self.begun:
+        if course is None or len(rows) != known:
+            course = started_with(question, seen, rows, course)
             self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
@@ -269,7 +266,7 @@ def _as_before(
 def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `led` are the plain fits with a constant bias.
+    `led` are plain fits of the strong inputs, with a constant bias.
     """
     known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))
@@ -363,13 +360,28 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
     )
 
 
+def started_with(
+    question: Question, seen: Imperfections, rows: Real, known: Course | None
+) -> Course:
+    """Plain fits of one input with other rows than the `known` ones.
+
+    They continue from these if that leaves white noise. Otherwise what the rows explain may have
+    led the known fits astray, and they are started from the spectra.
+    """
+    if known is not None and known.data.noise is None:
+        course = resumed(known, replace(known.problem, nuisance=rows), known.fits)
+        if course.best.is_white:
+            return course
+    return completed(free_from_wander(turn_ahead(started(question, seen, rows))))
+
+
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
 
 
 def lead(question: Question, seen: Imperfections) -> Led:
-    """Plain fit of the input that the output follows most, and its place."""
+    """Plain fit of the input that the output follows most, by its index."""
     likeliest = partial(
         fit_likeliest,
         known=question.measured,

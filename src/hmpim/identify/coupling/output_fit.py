@@ -86,7 +86,7 @@ class OutputFit:
     def slow(self) -> int | None:
         """An input whose fit may explain a drift; None without one."""
         for i, fit in enumerate(self.fits):
-            if fit.related and self.strong[i] and not without_slow({i: fit}):
+            if fit.related and self.strong[i] and _is_slow(fit):
                 return i
         return None
 
@@ -119,7 +119,12 @@ class OutputFit:
 
 def without_slow(led: Led) -> Led:
     """The fits that are not as slow as a drift."""
-    return {j: fit for j, fit in led.items() if not (spans_record(fit.best.fit) or fit.lingers)}
+    return {j: fit for j, fit in led.items() if not _is_slow(fit)}
+
+
+def _is_slow(fit: JointFit) -> bool:
+    """Whether a fit may explain a drift."""
+    return spans_record(fit.best.fit) or fit.lingers
 
 
 def fit_together(
@@ -144,7 +149,7 @@ def fit_together(
     inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
     coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
     enter linearly, such as a drift's. Inputs `excluded` are left out; each has its unrelated fit.
-    The search begins from the fits `led`, if they are known, which may have had other rows.
+    The search starts from the fits `led` if given; they may have been made with other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the plain fits to the strong inputs, and its value is
@@ -158,11 +163,17 @@ def fit_together(
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
     leads = partial(fit_likeliest, known=known, intersample=intersample, nuisance=nuisance)
-    pairs.begin(led or _lead(inputs, pairs, partial(leads, structures=plain)), nuisance)
+    if led:
+        pairs.resume(led, nuisance)
+    else:
+        pairs.begin(_lead(inputs, pairs, partial(leads, structures=plain)))
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
+    known = len(pairs.strong)
     _join(inputs, pairs, plainly)
     if strong_only:
+        if len(pairs.strong) > known:  # the others were fitted next to what these explain
+            _fit_strong(inputs, pairs, plainly)
         pairs.refine(pairs.kept, None)
         none = replace(pairs.fits[pairs.strong[0]], related=False)
         return OutputFit(

@@ -83,13 +83,22 @@ class Pairs:
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
 
-    def begin(self, led: Mapping[int, JointFit], nuisance: Real | None) -> None:
-        """Start from known fits to strong inputs, with `nuisance`, (k, n), as their rows."""
+    def begin(self, led: Mapping[int, JointFit]) -> None:
+        """Start from fits to strong inputs."""
         for i, fit in led.items():
-            self.put(i, _with_nuisance(fit, nuisance))
+            self.put(i, fit)
             self.strong.append(i)
-        if len(led) > 1 or any(self.fits[i] is not fit for i, fit in led.items()):
+
+    def resume(self, led: Mapping[int, JointFit], nuisance: Real | None) -> None:
+        """Start from fits with other rows, with `nuisance`, (k, n), as their rows.
+
+        Which samples count is then decided anew: it may have been decided wrongly.
+        """
+        fits = {i: _with_nuisance(fit, nuisance) for i, fit in led.items()}
+        self.begin(fits)
+        if len(led) > 1 or any(fits[i] is not fit for i, fit in led.items()):
             self.refine(self.kept, None)
+            self.masks.update(dict.fromkeys(led))
 
     def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
         """Note the data of one input's full search; whether the last one had others."""

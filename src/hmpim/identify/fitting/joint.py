@@ -15,8 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.fitting.beginning import look_again
+from hmpim.identify.fitting.beginning import in_motion, look_again
 from hmpim.identify.fitting.between import refit_between
+from hmpim.identify.fitting.candidates import is_poor
 from hmpim.identify.fitting.course import (
     Course,
     completed,
@@ -115,9 +116,10 @@ def fit_likeliest(
     structures: tuple[StructureName, ...],
     nuisance: Real | None = None,
 ) -> tuple[int, JointFit]:
-    """Fit an output to that of several inputs which explains most of it, by its key.
+    """Fit an output to each of several inputs; return the key and fit of the one explaining most.
 
-    Further poles are not tested. Inputs, (n,), and the rest are as for `joint_fit`.
+    Inputs that cannot win are not fitted completely, and further poles are not tested. Inputs,
+    (n,), and the rest are as for `joint_fit`.
     """
     found: dict[int, JointFit] = {}
     if intersample == "sampled":
@@ -130,8 +132,10 @@ def fit_likeliest(
     }
     least = np.inf
     for j in sorted(courses, key=lambda j: courses[j].best.cost):
-        if courses[j].best.cost < least:  # a complete fit seldom leaves less than the plain one
-            course = completed(free_from_wander(courses[j]))
+        course = courses[j]
+        moving = in_motion(course.data.u) and is_poor(course.best, course.problem.spread)
+        if moving or course.best.cost < least:  # otherwise a complete fit seldom leaves less
+            course = completed(free_from_wander(course))
             found[j] = chosen_of(course, structures, growing=False)
             least = min(least, found[j].best.fit.cost)
     return _likeliest(found)
