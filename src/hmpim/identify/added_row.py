@@ -306,7 +306,7 @@ def _with_rows(
 def _plain(
     question: Question, seen: Imperfections, joint: JointFit, known: Course | None
 ) -> Course:
-    """Plain fits of one input to the data of a joint fit; `known` are those without rows."""
+    """Plain fits of one input to the data of a joint fit; `known` has those without its rows."""
     rows = joint.problem.nuisance
     if known is not None and rows is not None:
         natural = [t.fit for t in joint.trials if t.intersample == known.natural]

@@ -244,7 +244,7 @@ class _Unit:
     ) -> None:
         """Steps from `at` on for which more friction would hold the unit.
 
-        `sizes` are |w| at the first of them, (m,); the rest is as for `_held`.
+        `sizes`, (m,), are |w| at the first of them, as far as known; the rest is as for `_held`.
         """
         beyond = sizes > self.most
         k = beyond.argmax().item() if sizes.size else 0

@@ -169,10 +169,10 @@ def fit_together(
         pairs.begin(_lead(inputs, pairs, partial(leads, structures=plain)))
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
-    known = len(pairs.strong)
+    joined = len(pairs.strong)
     _join(inputs, pairs, plainly)
     if strong_only:
-        if len(pairs.strong) > known:  # the others were fitted next to what these explain
+        if len(pairs.strong) > joined:  # the others were fitted next to what these explain
             _fit_strong(inputs, pairs, plainly)
         pairs.refine(pairs.kept, None)
         none = replace(pairs.fits[pairs.strong[0]], related=False)

@@ -300,7 +300,8 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
 def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
     """Fit structures to other data of the same input, each from where its fit ended.
 
-    `problem` has the output, the rows and the samples that count.
+    `problem` has the output, the rows and the samples that count. Unlike with `continued`, richer
+    structures may be tried later, and a noise model is kept.
     """
     y, lag = _level(problem.y, problem.nuisance, problem.valid), course.data.rough.lag
     ahead = lag if lag < 0 else None

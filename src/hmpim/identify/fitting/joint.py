@@ -189,7 +189,7 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
     """Choose among all fits, and again where the best of them shows that other samples count.
 
     Zeros in front of the hold would explain ends of the record that do not count. So they are only
-    tried once these are left out; if they lead, what else was left out is decided anew.
+    tried once these are left out; if they lead, which samples count is decided anew with them.
     """
     looked, trials, best, share = _looked_again(course, fitted)
     found = _fed_forward(looked, trials, _counting(looked, share))
@@ -359,8 +359,8 @@ def _chosen(course: Course, trials: list[Trial], count: float) -> tuple[Trial, l
 def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Trial]:
     """Fit each servo structure with its zeros in front of the hold.
 
-    If no zeros lead, only structures with no more parameters than the leading one: with more they
-    would only explain the ends of the record.
+    If the best structure has no zeros, only those with no more parameters: richer ones would merely
+    fit the ends of the record.
     """
     best = min(trials, key=lambda trial: trial.criterion).fit
     leading = best.structure

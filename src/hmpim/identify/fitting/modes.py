@@ -66,7 +66,7 @@ def grown_modes(
     for known in (False, True) if structures else ():
         before, grown = np.inf, _grown(rough, delay, memory, structures, known=known)
         begun = [fit_structure(problem, s, start, iterations=0) for s, start in grown.items()]
-        # Beside what more modes leave even before they are fitted, fewer may have no chance.
+        # If more modes leave much less even before they are fitted, fewer have no chance.
         least = min([hopeless, *(TWICE * fit.objective for fit in begun)])
         for fit in begun:
             structure = fit.structure

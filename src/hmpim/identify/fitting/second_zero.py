@@ -1,7 +1,7 @@
 """A servo's second zero: third order with two zeros, started from fits with one.
 
-From the rough response this fit often ends in a local minimum, or it is not tried since a simpler
-one leaves white noise. A start with a zero at infinity, or with a pole and a zero that cancel, is
+From the rough response this fit often ends in a local minimum, or it is not tried because a simpler
+one already leaves white noise. A start with a zero at infinity, or with a pole and a zero that cancel, is
 as good as the simpler fit.
 """
 
@@ -19,7 +19,7 @@ __all__ = ["with_second_zero"]
 def with_second_zero(
     problem: Problem, fits: list[Fit], richer: list[Fit], structures: tuple[StructureName, ...]
 ) -> list[Fit]:
-    """Add third order with two zeros to the richer fits, if zeros lead and it is likelier.
+    """Add third order with two zeros to the richer fits, if the best has zeros and it is likelier.
 
     Simpler fits from its poles are added too, as for all richer structures.
 

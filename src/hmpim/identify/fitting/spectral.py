@@ -151,7 +151,7 @@ def residual_of(rough: RoughResponse, structure: Structure, theta: Real) -> Roug
 
 
 class _Rough:
-    """Responses of one structure at the latest parameters, the numerators solved for."""
+    """Responses of one structure. `errors` sets its parameters and solves for the numerators."""
 
     def __init__(self, rough: RoughResponse, structure: Structure) -> None:
         self.structure, self._lag, self._root = structure, rough.lag, np.sqrt(rough.weight)
