@@ -315,3 +315,50 @@ def test_couplings_to_inputs_that_are_alike_at_low_frequencies_are_both_found(se
         assert gain.value == pytest.approx(model.scale_factor, abs=4 * gain.spread)
         late = model.delay + model.denominator[-2]
         assert lag.value == pytest.approx(late, abs=4 * lag.spread)
+
+
+def second_order(u, fs, delay, frequency, damping):
+    w = 2 * np.pi * frequency
+    model = hmpim.Model(delay=delay, scale_factor=1.0, denominator=(1 / w**2, 2 * damping / w, 1.0))
+    return hmpim.simulate(model, u, fs=fs, intersample="bandlimited")
+
+
+def test_the_weaker_input_is_fitted_again_once_the_leading_one_has_joined():
+    # The leading input's first fit explains the drift, so it is left out at first.
+    rng = np.random.default_rng(3)
+    n, fs = 1200, 100.0
+    t = np.arange(n) / fs
+    fade = np.sin(0.5 * np.pi * np.clip(np.minimum(t, t[-1] - t) / 0.5, 0, 1)) ** 2
+    u0 = fade * np.sin(2 * np.pi * (0.1 * t + 11.9 / 2 / t[-1] * t**2))
+    u1 = np.convolve(rng.standard_normal(n), np.ones(5) / 3, "same")
+    frequency, late = rng.uniform(2, 8), rng.uniform(0.02, 0.2)
+    y = second_order(u0, fs, late, frequency, 0.5)
+    other = rng.uniform(0.02, 0.2)
+    y = y + 0.6 * second_order(u1, fs, other, rng.uniform(2, 8), 0.5)
+    slow = np.polynomial.legendre.legval(
+        np.linspace(-1, 1, n), np.r_[0, rng.standard_normal(6) * 0.5 ** np.arange(6)]
+    )
+    y = y + slow / np.std(slow) + 0.01 * rng.standard_normal(n)
+    found = hmpim.identify(hmpim.Record.from_arrays({"u0": u0, "u1": u1}, {"y": y}, fs=fs))
+    for name, delay in (("u0", late), ("u1", other)):
+        pair = found["y", name]
+        assert (pair.structure, pair.verdict) == ("second_order", "ok")
+        assert abs(pair.delay.value - delay) < 1e-3
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
+    rng = np.random.default_rng(seed)
+    u = np.convolve(rng.standard_normal(1600), np.hanning(9) / 4, "same")
+    copy = np.r_[np.zeros(7), u[:-7]] + 0.1 * rng.standard_normal(1600)
+    y = second_order(u, 100.0, 0.05, 1.0, 0.05)
+    inside = slice(400, 1000)
+    found = hmpim.identify(
+        hmpim.Record.from_arrays(
+            {"u": u[inside], "copy": copy[inside]},
+            {"y": y[inside] + 0.02 * rng.standard_normal(600)},
+            fs=100.0,
+        )
+    )
+    assert found["y", "copy"].verdict == "not_identifiable"
+    assert abs(found["y", "u"].delay.value - 0.05) < 0.002

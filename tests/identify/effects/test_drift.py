@@ -199,3 +199,29 @@ def test_a_drift_and_hum_of_an_output_whose_leading_input_is_unrelated():
     result = hmpim.identify(record, structures=["second_order"])
     assert len(result) == 2
     assert result.verdict != "ok"
+
+
+@pytest.mark.parametrize(("seed", "size"), [(1, 3), (4, 30)])
+def test_a_drift_that_hides_the_dynamics_does_not_decide_where_their_fit_begins(seed, size):
+    # Without the drift's rows the plain fits end far from the truth.
+    rng = np.random.default_rng(1000 * seed + size)
+    n, fs = 1200, 100.0
+    t = np.arange(n) / fs
+    fade = np.sin(0.5 * np.pi * np.clip(np.minimum(t, t[-1] - t) / 0.5, 0, 1)) ** 2
+    high = rng.uniform(8, 25)
+    u = fade * np.sin(2 * np.pi * (0.1 * t + (high - 0.1) / 2 / t[-1] * t**2))
+    w, zeta, lag = 2 * np.pi * rng.uniform(2, 9), rng.uniform(0.3, 1), rng.uniform(0.003, 0.05)
+    below = np.array([1 / w**2, 2 * zeta / w, 1.0])
+    model = hmpim.Model(
+        delay=rng.uniform(0.01, 0.3),
+        scale_factor=1.0,
+        denominator=tuple(np.convolve(below, [lag, 1.0]) if seed % 2 else below),
+    )
+    slow = np.polynomial.legendre.legval(
+        np.linspace(-1, 1, n), np.r_[0, rng.standard_normal(6) * 0.5 ** np.arange(6)]
+    )
+    y = hmpim.simulate(model, u, fs=fs, intersample="bandlimited") + size * slow / np.std(slow)
+    record = hmpim.Record.from_arrays({"u": u}, {"y": y + 0.01 * rng.standard_normal(n)}, fs=fs)
+    pair = hmpim.identify(record)["y", "u"]
+    assert pair.verdict == "ok"
+    assert abs(pair.delay.value - model.delay) < 0.005

@@ -1,8 +1,8 @@
 """A servo's second zero: third order with two zeros, started from fits with one.
 
 From the rough response this fit often ends in a local minimum, or it is not tried because a simpler
-one already leaves white noise. A start with a zero at infinity, or with a pole and a zero that cancel, is
-as good as the simpler fit.
+one already leaves white noise. A start with a zero at infinity, or with a pole and a zero that
+cancel, is as good as the simpler fit.
 """
 
 import numpy as np
