@@ -362,3 +362,16 @@ def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
     )
     assert found["y", "copy"].verdict == "not_identifiable"
     assert abs(found["y", "u"].delay.value - 0.05) < 0.002
+
+
+def test_the_delay_of_a_program_with_two_inputs_is_a_known_number_of_samples():
+    rng = np.random.default_rng(0)
+    u, v = rng.standard_normal((2, 1200))
+    y = 0.7 * np.r_[np.zeros(5), u[:-5]] + 0.4 * np.r_[np.zeros(3), v[:-3]]
+    record = hmpim.Record.from_arrays(
+        {"u": u, "v": v}, {"y": y + 0.01 * rng.standard_normal(1200)}, fs=100.0
+    )
+    found = hmpim.identify(record, intersample="sampled")
+    for name, late in (("u", 5), ("v", 3)):
+        delay = found["y", name].delay
+        assert (round(delay.value * 100, 9), delay.std) == (late, 0.0)

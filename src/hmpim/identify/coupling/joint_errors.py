@@ -58,7 +58,10 @@ def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real
     end, start, out = rows.shape[0] - 1, 0, []
     for block in blocks:
         span = [*range(start, start + block.shape[0]), end]
-        out.append(full[np.ix_(span, span)])
+        own = full[np.ix_(span, span)]
+        if last.best.fit.structure.sampled:  # its delay is a known number of samples
+            own[0], own[:, 0] = 0.0, 0.0
+        out.append(own)
         start += block.shape[0]
     return out
 
