@@ -11,7 +11,7 @@ coupling. The error bars come from all pairs' derivatives together, so inputs th
 other widen them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,7 +20,7 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
-from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
+from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution, with_nuisance
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
@@ -162,11 +162,18 @@ def fit_together(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
-    leads = partial(fit_likeliest, known=known, intersample=intersample, nuisance=nuisance)
     if led:
         pairs.resume(led, nuisance)
     else:
-        pairs.begin(_lead(inputs, pairs, partial(leads, structures=plain)))
+        likeliest = partial(
+            fit_likeliest,
+            known=known,
+            intersample=intersample,
+            structures=plain,
+            nuisance=nuisance,
+        )
+        leading = fit_leading(inputs, y, valid=valid, likeliest=likeliest, excluded=excluded)
+        pairs.begin(leading)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
     joined = len(pairs.strong)
@@ -235,11 +242,9 @@ def fit_in_motion(
     def freed(j: int, fit: JointFit) -> JointFit:
         moves = j == moving or in_motion(inputs[j])
         begins = counted.begins if moves else None
-        problem = replace(fit.problem, valid=counted.valid, nuisance=nuisance, begins=begins)
-        weights = np.zeros(0 if nuisance is None else len(nuisance))
-        best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
-        first = counted.first or 0
-        return replace(fit, problem=problem, best=best, trials=(best,), forgotten=first)
+        other = with_nuisance(fit, nuisance)
+        problem = replace(other.problem, valid=counted.valid, begins=begins)
+        return replace(other, problem=problem, forgotten=counted.first or 0)
 
     strong = [j for j, one in enumerate(fitted.strong) if one]
     pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), excluded={})
@@ -291,19 +296,20 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
             pairs.put(i, fitted(inputs[i], rest, valid=counted))
 
 
-def fit_leading(inputs: list[Real], y: Real, *, valid: Mask | None, likeliest: _Likeliest) -> Led:
+def fit_leading(
+    inputs: list[Real],
+    y: Real,
+    *,
+    valid: Mask | None,
+    likeliest: _Likeliest,
+    excluded: Collection[int] = (),
+) -> Led:
     """Fit the input that an output, (n,), follows most; the others count as noise."""
-    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=(), excluded={})
-    return _lead(inputs, pairs, likeliest)
-
-
-def _lead(inputs: list[Real], pairs: Pairs, likeliest: _Likeliest) -> Led:
-    """Fit the input that the output follows most."""
-    level = bridged(pairs.y, pairs.valid)
-    share = {j: _follows_at_all(inputs[j], level) for j in _waiting(inputs, pairs)}
+    level = bridged(y, valid)
+    share = {j: _follows_at_all(u, level) for j, u in enumerate(inputs) if j not in excluded}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
     likely = {j: inputs[j] for j in (*_likely(share), *_likely(sums))}
-    return dict([likeliest(likely, pairs.y, valid=pairs.valid)])
+    return dict([likeliest(likely, y, valid=valid)])
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:

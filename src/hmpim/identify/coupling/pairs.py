@@ -17,7 +17,7 @@ from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
 from hmpim.record import Intersample
 
-__all__ = ["Pairs", "constant_of", "contribution"]
+__all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,9 +94,9 @@ class Pairs:
 
         Which samples count is then decided anew: it may have been decided wrongly.
         """
-        fits = {i: _with_nuisance(fit, nuisance) for i, fit in led.items()}
-        self.begin(fits)
-        if len(led) > 1 or any(fits[i] is not fit for i, fit in led.items()):
+        others = {i: fit for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
+        self.begin({**led, **{i: with_nuisance(fit, nuisance) for i, fit in others.items()}})
+        if len(led) > 1 or others:
             self.refine(self.kept, None)
             self.masks.update(dict.fromkeys(led))
 
@@ -186,13 +186,16 @@ class Pairs:
         return True
 
 
-def _with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
-    """A fit with other rows, (k, n), that explain nothing yet; the same if they are its own."""
+def _has_nuisance(fit: JointFit, nuisance: Real | None) -> bool:
+    """Whether these rows, (k, n), are those of a fit."""
     own = fit.problem.nuisance
-    if own is nuisance:
-        return fit
-    if own is not None and nuisance is not None and np.array_equal(own, nuisance):
-        return fit
+    if own is None or nuisance is None:
+        return own is nuisance
+    return np.array_equal(own, nuisance)
+
+
+def with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
+    """A fit with other rows, (k, n), that explain nothing yet."""
     problem = replace(fit.problem, nuisance=nuisance)
     weights = np.zeros(0 if nuisance is None else len(nuisance))
     best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
