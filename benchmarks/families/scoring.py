@@ -167,7 +167,7 @@ def _cell_of(figures: dict[str, Scored], verdict: str, off: float | None, *, rel
 def _measured_off(measured: Any, truth: Response) -> bool | None:
     """Whether more than a twentieth of the measured points lie beyond 5 % and 5 deviations.
 
-    Of a held input the ratio of the samples' spectra counts as true as well.
+    Of a held or linear input the ratio of the samples' spectra counts as true as well.
     """
     if measured is None:
         return None

@@ -305,17 +305,17 @@ def _response(
         value=value[known],
         band=(low, high),
         at=at,
-        sampled=_held_response(take) if take.drive.between == "zoh" else None,
+        sampled=_sampled_response(take) if take.drive.between in ("zoh", "foh") else None,
         others=tuple(rival.response(grid[known]) for rival in rivals),
     )
 
 
-def _held_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
-    """Response from the samples of a held input to those of the output, delay included."""
+def _sampled_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
+    """Response from the samples of a held or linear input to those of the output, with the delay."""
     system, fs = take.system, take.drive.fs
     impulse = Drive(
         source=Samples(np.array([0.0, 1.0, 0.0]), fs, -1 / fs),
-        between="zoh",
+        between=take.drive.between,
         band=take.drive.band,
         fs=fs,
         samples=1 + int(np.clip(take.drive.samples, 2, 20_000)),
