@@ -311,7 +311,7 @@ def _response(
 
 
 def _sampled_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
-    """Response from the samples of a held or linear input to those of the output, with the delay."""
+    """Response from the samples of a held or linear input to those of the output."""
     system, fs = take.system, take.drive.fs
     impulse = Drive(
         source=Samples(np.array([0.0, 1.0, 0.0]), fs, -1 / fs),
