@@ -14,7 +14,6 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import LIKELIER
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
@@ -56,7 +55,6 @@ class Drifting:
     # mean rate over the record and its standard deviation, in the output's unit per sample
     rate: float
     rate_std: float
-    rival: Fit | None  # the fit with a constant bias, if the odds against it are below 20
 
 
 def with_drift(
@@ -89,8 +87,7 @@ def with_drift(
         gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
         if gain < 0.0:
             return first, None
-    rival = first.best.fit if gain < 2 * LIKELIER else None
-    return _unless_steady(joint, columns, steadily, rival)
+    return _unless_steady(joint, columns, steadily)
 
 
 def with_plain_drift(
@@ -120,11 +117,11 @@ def with_plain_drift(
     gain = criterion_gain(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
-    return _unless_steady(joint, columns, steadily, fit if gain < 2 * LIKELIER else None)
+    return _unless_steady(joint, columns, steadily)
 
 
 def _unless_steady(
-    joint: JointFit, columns: Real, steadily: _Steadily, rival: Fit | None
+    joint: JointFit, columns: Real, steadily: _Steadily
 ) -> tuple[JointFit, Drifting | None]:
     """Subtract the drift from the fit, or return one with a constant bias that explains as much."""
     steady = steadily(joint)
@@ -147,7 +144,6 @@ def _unless_steady(
         steady=len(columns) == 1,
         rate=float(across @ weights),
         rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
-        rival=rival,
     )
     # The rows of the drift stay free; the bias is the mean.
     return without_rows(joint, slice(len(columns))), drifting
