@@ -38,7 +38,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
+from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
@@ -382,14 +382,14 @@ def counted_in(question: Question, seen: Imperfections) -> Mask | None:
 
 def lead(question: Question, seen: Imperfections) -> Led:
     """Plain fit of the input that the output follows most, by its index."""
-    likeliest = partial(
-        fit_likeliest,
+    return fit_leading(
+        [source.values for source in question.aligned.inputs],
+        question.output.values,
+        counted_in(question, seen),
         known=question.measured,
         intersample=question.intersample,
         structures=question.plain,
     )
-    inputs, output = [source.values for source in question.aligned.inputs], question.output
-    return fit_leading(inputs, output.values, valid=counted_in(question, seen), likeliest=likeliest)
 
 
 def fit_once(

@@ -14,11 +14,12 @@ other widen them.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM
+from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution, with_nuisance
 from hmpim.identify.coupling.residual import misfit_at_any_lag
@@ -38,7 +39,7 @@ from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
+from hmpim.identify.worth import NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
@@ -47,8 +48,6 @@ __all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together", "
 
 Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
-
-_Likeliest = Callable[..., tuple[int, JointFit]]
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -162,18 +161,9 @@ def fit_together(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
-    if led:
-        pairs.resume(led, nuisance)
-    else:
-        likeliest = partial(
-            fit_likeliest,
-            known=known,
-            intersample=intersample,
-            structures=plain,
-            nuisance=nuisance,
-        )
-        leading = fit_leading(inputs, y, valid=valid, likeliest=likeliest, excluded=excluded)
-        pairs.begin(leading)
+    options = {"known": known, "intersample": intersample, "structures": plain}
+    begun = led or fit_leading(inputs, y, valid, excluded, nuisance=nuisance, **options)
+    pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
     joined = len(pairs.strong)
@@ -299,17 +289,19 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
 def fit_leading(
     inputs: list[Real],
     y: Real,
-    *,
     valid: Mask | None,
-    likeliest: _Likeliest,
     excluded: Collection[int] = (),
+    **options: Any,
 ) -> Led:
-    """Fit the input that an output, (n,), follows most; the others count as noise."""
+    """Fit the input that an output, (n,), follows most; the others count as noise.
+
+    The options are those of `hmpim.identify.fitting.joint.fit_likeliest`.
+    """
     level = bridged(y, valid)
     share = {j: _follows_at_all(u, level) for j, u in enumerate(inputs) if j not in excluded}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
     likely = {j: inputs[j] for j in (*_likely(share), *_likely(sums))}
-    return dict([likeliest(likely, y, valid=valid)])
+    return dict([fit_likeliest(likely, y, valid=valid, **options)])
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
@@ -324,9 +316,6 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        own = pairs.fits.get(i)
-        if own is not None and own.related and _leaves_less(own, tried[i]):
-            continue  # it is a coupling
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -342,8 +331,6 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
-    if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
-        counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
     sums: set[int] = set()
@@ -379,12 +366,6 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     return [j for j, one in share.items() if one >= NEARLY * most]
 
 
-def _leaves_less(one: JointFit, other: JointFit) -> bool:
-    """Whether a fit is clearly likelier than another, as its residual is smaller."""
-    (own, few), (rest, many) = ((f.best.fit.cost, f.problem.counted) for f in (one, other))
-    return bool(0.5 * few * np.log(max(rest / many, 1e-300) / max(own / few, 1e-300)) > CLEARLY)
-
-
 def _is_large(fit: JointFit) -> bool:
     """Whether an input explains a large part of the output without the others."""
     counts = slice(None) if fit.problem.valid is None else fit.problem.valid
@@ -400,16 +381,14 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
 def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
     """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
-    A response so late that it leaves out most of the record explains errors of the stronger inputs'
-    models, such as friction. A pole as slow as the record also explains a drift: it counts only
-    if a drift explains less than the sum does.
+    A pole as slow as the record also explains a drift: it counts only if a drift explains less than
+    the sum does.
     """
     problem, fit = tried.problem, tried.best.fit
-    if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
+    if not spans_record(fit):
+        return tried.related
+    if not (tried.related and summed):
         return False
-    slow = spans_record(fit)
-    if not slow or not summed:
-        return not slow
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
     drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit

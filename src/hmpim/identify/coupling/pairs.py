@@ -83,19 +83,16 @@ class Pairs:
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
 
-    def begin(self, led: Mapping[int, JointFit]) -> None:
-        """Start from fits to strong inputs."""
-        for i, fit in led.items():
-            self.put(i, fit)
-            self.strong.append(i)
-
     def resume(self, led: Mapping[int, JointFit], nuisance: Real | None) -> None:
-        """Start from fits with other rows, with `nuisance`, (k, n), as their rows.
+        """Start from fits to strong inputs, with `nuisance`, (k, n), as their rows.
 
-        Which samples count is then decided anew: it may have been decided wrongly.
+        If they had other rows, which samples count is decided anew: it may have been decided
+        wrongly.
         """
-        others = {i: fit for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
-        self.begin({**led, **{i: with_nuisance(fit, nuisance) for i, fit in others.items()}})
+        others = {i for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
+        for i, fit in led.items():
+            self.put(i, with_nuisance(fit, nuisance) if i in others else fit)
+            self.strong.append(i)
         if len(led) > 1 or others:
             self.refine(self.kept, None)
             self.masks.update(dict.fromkeys(led))

@@ -125,8 +125,6 @@ def coupling_fit(
     rough = rough_response(moves, answer, longest_delay=longest)
     fits: list[Fit] = []
     tried = tuple(name for name in structures if name in _COUPLED) or _COUPLED
-    if not np.any(rough.response):  # nothing that could show a pole
-        tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
         structure, seen = STRUCTURES[name], rough
         if structure.dc_zeros:  # a plain second order, driven by the input's acceleration
