@@ -175,7 +175,6 @@ def test_a_drift_is_taken_if_the_criterion_improves(monkeypatch, gain, drifts):
     joint, found = drift.with_drift(
         first,
         lambda rows, _: joint_fit(u, y, structures=plain, nuisance=rows),
-        lambda _: None,
     )
     assert (found is not None, joint is first) == (drifts, not drifts)
 

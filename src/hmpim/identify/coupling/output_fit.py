@@ -20,22 +20,19 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
-from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution, with_nuisance
+from hmpim.identify.coupling.joint_errors import covariances, derivatives
+from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
-from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import Course, bridged
-from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import fit_likeliest, joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
@@ -44,7 +41,7 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
 
-__all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together", "without_slow"]
+__all__ = ["Led", "OutputFit", "fit_leading", "fit_together", "without_slow"]
 
 Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
@@ -210,46 +207,6 @@ def _fit_in_turns(
             break  # otherwise each was fitted with wrong contributions of the others
         _fit_couplings(inputs, pairs, structures)
         pairs.refine(pairs.kept, None)
-
-
-def fit_in_motion(
-    fitted: OutputFit, inputs: list[Real], y: Real, moving: int, nuisance: Real | None
-) -> OutputFit | None:
-    """Fit the same dynamics with a free initial state; None unless that leaves white noise.
-
-    `fitted` is a fit with other rows; `inputs`, `y` and `nuisance` are as for `fit_together`. The
-    input `moving` may have moved before the record, others only if they move from its start.
-    """
-    fits = {j: fit for j, fit in enumerate(fitted.fits) if fit.related}
-    if moving not in fits or fits[moving].best.fit.structure.integrators:
-        return None
-    valid = common(fit.problem.valid for fit in fits.values())
-    latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
-    counted = begin_at(Counted(valid=valid, begins=None), max(latest, 0) + REACH, y.size)
-    if counted is None:
-        return None
-
-    def freed(j: int, fit: JointFit) -> JointFit:
-        moves = j == moving or in_motion(inputs[j])
-        begins = counted.begins if moves else None
-        other = with_nuisance(fit, nuisance)
-        problem = replace(other.problem, valid=counted.valid, begins=begins)
-        return replace(other, problem=problem, forgotten=counted.first or 0)
-
-    strong = [j for j, one in enumerate(fitted.strong) if one]
-    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), excluded={})
-    for j, fit in enumerate(fitted.fits):
-        pairs.put(j, freed(j, fit))
-    pairs.refine(pairs.kept, None)
-    found = pairs.fits[moving]
-    if not found.best.fit.is_white:
-        washed = washed_out(found.problem, found.best.fit)
-        if washed is None:
-            return None
-        best = replace(found.best, fit=washed)
-        pairs.put(moving, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
-        pairs.refine(pairs.kept, None)
-    return _moved_at_once(pairs) if pairs.fits[moving].best.fit.is_white else None
 
 
 def _moved_at_once(pairs: Pairs) -> OutputFit:
