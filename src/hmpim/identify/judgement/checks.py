@@ -127,11 +127,15 @@ def attempt(name: str, look: Callable[[], T], otherwise: U) -> tuple[T | U, tupl
     try:
         return look(), ()
     except Exception as error:  # whatever it is, the result stands without this check
-        failed = Finding(
-            code="check_failed",
-            message=f"The check {name.replace('_', ' ')!r} failed to run ({type(error).__name__}: "
-            f"{error}). The rest of the result is unaffected; please report the record.",
-            severity="info",
-            parameters=(),
-        )
-        return otherwise, (failed,)
+        return otherwise, (failed(name, error),)
+
+
+def failed(name: str, error: Exception) -> Finding:
+    """Report which check raised, and what."""
+    return Finding(
+        code="check_failed",
+        message=f"The check {name.replace('_', ' ')!r} failed to run ({type(error).__name__}: "
+        f"{error}). The rest of the result is unaffected; please report the record.",
+        severity="info",
+        parameters=(),
+    )
