@@ -23,7 +23,7 @@ from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
-from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
+from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -59,7 +59,6 @@ class OutputFit:
     fits: tuple[JointFit, ...]
     covariances: tuple[Real, ...] = ()  # (p_i, p_i): of each fit's parameters, with all fits free
     strong: tuple[bool, ...] = (True,)  # whether the input's contribution is large, not a coupling
-    lags: tuple[Lag | None, ...] = (None,)  # delay and lag of couplings of at most first order
     drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
     asked: int = 0  # the input with which the drift was fitted
     humming: Humming | None = None  # mains hum; each fit's output is without it
@@ -217,21 +216,15 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
     while pairs.together(whitening):
         pairs.refine(pairs.kept, whitening)
     errors: dict[int, Real] = {}
-    lags: dict[int, Lag | None] = {}
     fits = [pairs.fits[j] for j in pairs.kept]
     if fits:
         problem, blocks, bias = derivatives(fits, whitening)
         errors = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
-    for k, j in enumerate(pairs.kept):
-        if j not in pairs.strong:
-            others = np.vstack([*blocks[:k], *blocks[k + 1 :], bias])
-            lags[j] = lag_of(problem, fits[k], others)
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
         covariances=tuple(errors.get(j, np.zeros((0, 0))) for j in everyone),
         strong=tuple(j in pairs.strong for j in everyone),
-        lags=tuple(lags.get(j) for j in everyone),
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -266,21 +266,12 @@ def settled(
     parameters = pair.parameters
     unknown: list[str] = []
     if not joined.strong[i]:
-        lag = joined.lags[i]
         late, gain = unsettled(joined.fits[i])
         parameters = replace(
             parameters,
             delay=_widened(parameters.delay, late / fs**2),
             scale_factor=_widened(parameters.scale_factor, gain),
         )
-        if lag is not None:
-            seconds = partial(estimate, unit="s")
-            time_constant = seconds(lag.time_constant / fs, (lag.time_constant_std / fs) ** 2)
-            parameters = replace(
-                parameters,
-                delay=seconds(lag.delay / fs, (lag.delay_std**2 + late) / fs**2),
-                time_constant=time_constant if pair.structure == "first_order" else None,
-            )
         parameters, unknown = _determined(parameters, inputs.bands[i])
     findings = list(pair.warnings)
     if unknown:
