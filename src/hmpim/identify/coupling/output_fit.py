@@ -179,8 +179,6 @@ def fit_together(
             return drifting
     richly = partial(fitted, structures=structures, shared=True)
     _fit_in_turns(inputs, pairs, plainly, richly, structures)
-    if pairs.demote():
-        _fit_couplings(inputs, pairs, structures)
     return _moved_at_once(pairs)
 
 
@@ -366,8 +364,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     others = [inputs[j] for j in weak]
     whitening = whitening_of(rest, others, late=late)
     mode = "zoh" if is_held(mode) else mode  # a coupling receives no feedforward
-    modes = {j: pairs.between.get(j, mode) for j in weak}
-    sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
+    sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
     for names in (structures,) if known else (roughly, structures):  # whitened anew each time
@@ -382,7 +379,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
             )
             if names is not structures:
                 problem = pairs.apart(problem, j)
-            fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
+            fit = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
             pairs.put(j, fit)
         # Test none before all are fitted: inputs that are alike explain each other's share.
         while pairs.together(whitening, drop=names is structures):
