@@ -23,7 +23,6 @@ __all__ = [
     "LIKELIER",
     "ONE_SIDED",
     "SEARCHED",
-    "SEEN",
     "deviations",
     "searched",
 ]
@@ -76,9 +75,6 @@ HALF = _NORMAL.inv_cdf(0.5 + COVERAGE / 2)
 
 ONE_SIDED = _NORMAL.inv_cdf(COVERAGE)
 """One-sided limit of a normal error at the same probability: 1.645."""
-
-SEEN = HALF**2
-"""Twice the log-likelihood that one parameter more gains by chance as rarely: 3.84."""
 
 BULK = _NORMAL.inv_cdf(0.75)
 """Deviations within which half of all normal errors lie: 0.674."""

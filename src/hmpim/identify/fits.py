@@ -10,7 +10,6 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.coupling.output_fit import (
     Led,
     OutputFit,
-    fit_in_motion,
     fit_leading,
     fit_together,
     without_slow,
@@ -38,7 +37,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
+from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
@@ -173,7 +172,6 @@ class _WithRows:
         slow = fitted.slow if self.several else 0
         self.asked = fitted.leading if slow is None else slow
         self.latest = fitted  # with the rows that were tried last
-        self.freed: OutputFit | None = None
         self.unrelated: dict[int, JointFit] = {}
         self.begun = begun  # plain fits of a single input, at first without rows
         self.between: Fits = []  # the same under each assumption between the samples
@@ -194,16 +192,14 @@ class _WithRows:
         others = ((i, fit) for i, fit in enumerate(steady.fits) if i != self.asked)
         unrelated = {i: fit for i, fit in others if not fit.related}
         self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
-        joint, drifting = with_drift(before, self.with_rows, self.steadily)
+        joint, drifting = with_drift(before, self.with_rows)
         if self.unrelated and drifting is not None:
             self.unrelated = {}
-            joint, drifting = with_drift(before, self.with_rows, self.steadily)
+            joint, drifting = with_drift(before, self.with_rows)
         humming = self.humming
         if drifting is not None:
             steady = self.latest
             humming = None if humming is None else replace(humming, trend=self.hum)
-        elif self.freed is not None and joint is self.freed.fits[self.asked]:
-            steady = self.freed
         kept = replace(steady, drifting=drifting, humming=humming, asked=self.asked)
         if self.several:
             return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
@@ -238,14 +234,6 @@ class _WithRows:
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
         return OutputFit(fits=(joint,))
 
-    def steadily(self, _: JointFit) -> JointFit | None:
-        """The same dynamics of several inputs with a constant bias, from a state that is free."""
-        if not self.several:
-            return None
-        hum = None if self.humming is None else self.humming.rows
-        self.freed = _all_free(self.question, self.latest, self.asked, hum)
-        return None if self.freed is None else self.freed.fits[self.asked]
-
 
 def _as_before(
     question: Question, course: Course, before: OutputFit, found: OutputFit
@@ -270,7 +258,6 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
     """
     known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))
-    freed: OutputFit | None = None
 
     def begun(rows: Real) -> tuple[Problem, Fit]:
         nonlocal known
@@ -284,17 +271,9 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         plain = fit_once(question, seen, question.plain, rows, begun=known)
         return plain.fits[asked]
 
-    def steadily(_: JointFit) -> JointFit | None:
-        nonlocal freed
-        freed = _all_free(question, plain, asked)
-        return None if freed is None else freed.fits[asked]
-
-    found = with_plain_drift(first.problem, first.best.fit, begun, fitted, steadily)
+    found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
     if found is None or not found[0].related:
         return None
-    drifting = found[1]
-    if drifting is None:
-        return freed
     steady = fit_once(question, seen, question.plain, begun=led)
     former = steady.fits[asked]
     if former.best.fit.is_white and steady.slow is None:
@@ -303,15 +282,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
     if criterion_gain(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
         return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
-    return replace(plain, fits=fits, drifting=drifting, asked=asked)
-
-
-def _all_free(
-    question: Question, fitted: OutputFit, asked: int, rows: Real | None = None
-) -> OutputFit | None:
-    """Fits of several inputs with a constant bias, from a state that is free."""
-    u = [source.values for source in question.aligned.inputs]
-    return fit_in_motion(fitted, u, question.output.values, asked, rows)
+    return replace(plain, fits=fits, drifting=found[1], asked=asked)
 
 
 @kept
@@ -382,14 +353,14 @@ def counted_in(question: Question, seen: Imperfections) -> Mask | None:
 
 def lead(question: Question, seen: Imperfections) -> Led:
     """Plain fit of the input that the output follows most, by its index."""
-    likeliest = partial(
-        fit_likeliest,
+    return fit_leading(
+        [source.values for source in question.aligned.inputs],
+        question.output.values,
+        counted_in(question, seen),
         known=question.measured,
         intersample=question.intersample,
         structures=question.plain,
     )
-    inputs, output = [source.values for source in question.aligned.inputs], question.output
-    return fit_leading(inputs, output.values, valid=counted_in(question, seen), likeliest=likeliest)
 
 
 def fit_once(

@@ -202,7 +202,6 @@ def _pair(own: _Followed) -> PairIdentification:
     left, untested = attempt("misfit", partial(_left, own, joint), Misfit())
     evidence = _evidence(own, joint, readings, from_response, left, moves, inspection)
     parameters, seen = with_imperfections(evidence.spanned, own.found, censored, output.unit)
-    known = {finding.code for finding in seen}
     spread = _spread(joint)
     prediction, residual = own.as_recorded(joint.best.fit)
     numerator, denominator = readings.coefficients
@@ -223,7 +222,7 @@ def _pair(own: _Followed) -> PairIdentification:
             *_of_the_question(question, own.units[0]),
             *judge(evidence),
             *seen,
-            *(finding for finding in said if finding.code not in known),
+            *said,
             *_of_the_model(own, white=readings.white),
             *(*unseen, *unmoved, *unread, *untested),
         ),
@@ -302,10 +301,7 @@ def _evidence(
         limited=question.limited is not None,
         gaining=gaining,
     )
-    drifting = joined.drifting if own.i == joined.asked else None
     others = [] if gaining is None else [*gaining.others]
-    if drifting is not None and drifting.rival is not None:
-        others.append(drifting.rival)
     bending = joined.bending_of(own.i)
     if bending is not None:
         others.extend(bending.others.values())
@@ -316,7 +312,6 @@ def _evidence(
         highest=min(own.band[1], fs / 2),
         bent=[(one.fit, one.farthest) for one in moves],
         others=others,
-        owed=evidence.owed,
     )
     if any(one.matters for one in moves):
         whole = blurred(whole, WORTH)

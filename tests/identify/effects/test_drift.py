@@ -164,14 +164,8 @@ def test_a_free_response_that_a_drift_imitates_is_no_drift():
     assert pair.bias.value == pytest.approx(2.1, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("gain", "drifts", "rival"),
-    [(20.0, True, False), (5.0, True, True), (-5.0, False, False)],
-)
-def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
-    monkeypatch, gain, drifts, rival
-):
-    """By Schwarz's criterion: -2 log odds of 20 to 1 are 6."""
+@pytest.mark.parametrize(("gain", "drifts"), [(5.0, True), (-5.0, False)])
+def test_a_drift_is_taken_if_the_criterion_improves(monkeypatch, gain, drifts):
     u = np.sin(2 * np.pi * (0.1 * T + 0.95 * T**2))
     y = np.convolve(u, np.exp(-np.arange(40) / 8.0) / 8.0)[: T.size] + 0.3 * T
     y = y + 0.02 * np.random.default_rng(4).standard_normal(T.size)
@@ -181,10 +175,8 @@ def test_a_constant_bias_stays_an_explanation_unless_it_is_excluded(
     joint, found = drift.with_drift(
         first,
         lambda rows, _: joint_fit(u, y, structures=plain, nuisance=rows),
-        lambda _: None,
     )
     assert (found is not None, joint is first) == (drifts, not drifts)
-    assert ((found.rival if found else None) is first.best.fit) == rival
 
 
 def test_a_drift_and_hum_of_an_output_whose_leading_input_is_unrelated():

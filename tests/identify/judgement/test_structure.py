@@ -165,14 +165,3 @@ def test_a_figure_that_a_model_allowed_does_not_have_is_open_and_doubtful(clean)
     (found,) = wide_span(replace(clean, spanned=spanned))
     assert found.parameters == ("natural_frequency",)
     assert "natural frequency above 9" in found.message
-
-
-def test_an_assumption_is_not_excluded_by_less_than_what_follows_the_input(clean):
-    far = with_assumption(clean, "second_order", delay=-0.5, criterion=40.0)
-    worse = far.joint.trials[-1]
-    worse = replace(worse, fit=replace(worse.fit, objective=1.2 * far.joint.best.fit.objective))
-    far = replace(far, joint=replace(far.joint, trials=(*far.joint.trials[:-1], worse)))
-    assert not [*other_intersample(far)]
-    for share, named in ((0.15, 0), (0.25, 1)):
-        left = replace(far.misfit, share=share, probability=1e-9)
-        assert len([*other_intersample(replace(far, misfit=left))]) == named

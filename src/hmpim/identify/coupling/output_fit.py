@@ -14,41 +14,37 @@ other widen them.
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
-from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution, with_nuisance
+from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.coupling.joint_errors import covariances, derivatives
+from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
-from hmpim.identify.coupling.weak import Lag, coupling_fit, lag_of, whitening_of
+from hmpim.identify.coupling.weak import coupling_fit, whitening_of
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
-from hmpim.identify.fitting.beginning import REACH, begin_at, in_motion
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import Course, bridged
-from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import fit_likeliest, joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.fitting.washout import washed_out
 from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
+from hmpim.identify.worth import NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
 
-__all__ = ["Led", "OutputFit", "fit_in_motion", "fit_leading", "fit_together", "without_slow"]
+__all__ = ["Led", "OutputFit", "fit_leading", "fit_together", "without_slow"]
 
 Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
-
-_Likeliest = Callable[..., tuple[int, JointFit]]
 
 _TURNS = 3
 """Times that the strong inputs are fitted, each with the others known."""
@@ -63,7 +59,6 @@ class OutputFit:
     fits: tuple[JointFit, ...]
     covariances: tuple[Real, ...] = ()  # (p_i, p_i): of each fit's parameters, with all fits free
     strong: tuple[bool, ...] = (True,)  # whether the input's contribution is large, not a coupling
-    lags: tuple[Lag | None, ...] = (None,)  # delay and lag of couplings of at most first order
     drifting: Drifting | None = None  # drift of the bias; each fit's output is without it
     asked: int = 0  # the input with which the drift was fitted
     humming: Humming | None = None  # mains hum; each fit's output is without it
@@ -162,18 +157,9 @@ def fit_together(
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
     pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
-    if led:
-        pairs.resume(led, nuisance)
-    else:
-        likeliest = partial(
-            fit_likeliest,
-            known=known,
-            intersample=intersample,
-            structures=plain,
-            nuisance=nuisance,
-        )
-        leading = fit_leading(inputs, y, valid=valid, likeliest=likeliest, excluded=excluded)
-        pairs.begin(leading)
+    options = {"known": known, "intersample": intersample, "structures": plain}
+    begun = led or fit_leading(inputs, y, valid, excluded, nuisance=nuisance, **options)
+    pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
     joined = len(pairs.strong)
@@ -193,8 +179,6 @@ def fit_together(
             return drifting
     richly = partial(fitted, structures=structures, shared=True)
     _fit_in_turns(inputs, pairs, plainly, richly, structures)
-    if pairs.demote():
-        _fit_couplings(inputs, pairs, structures)
     return _moved_at_once(pairs)
 
 
@@ -222,46 +206,6 @@ def _fit_in_turns(
         pairs.refine(pairs.kept, None)
 
 
-def fit_in_motion(
-    fitted: OutputFit, inputs: list[Real], y: Real, moving: int, nuisance: Real | None
-) -> OutputFit | None:
-    """Fit the same dynamics with a free initial state; None unless that leaves white noise.
-
-    `fitted` is a fit with other rows; `inputs`, `y` and `nuisance` are as for `fit_together`. The
-    input `moving` may have moved before the record, others only if they move from its start.
-    """
-    fits = {j: fit for j, fit in enumerate(fitted.fits) if fit.related}
-    if moving not in fits or fits[moving].best.fit.structure.integrators:
-        return None
-    valid = common(fit.problem.valid for fit in fits.values())
-    latest = max(int(np.ceil(fit.best.fit.delay)) for fit in fits.values())
-    counted = begin_at(Counted(valid=valid, begins=None), max(latest, 0) + REACH, y.size)
-    if counted is None:
-        return None
-
-    def freed(j: int, fit: JointFit) -> JointFit:
-        moves = j == moving or in_motion(inputs[j])
-        begins = counted.begins if moves else None
-        other = with_nuisance(fit, nuisance)
-        problem = replace(other.problem, valid=counted.valid, begins=begins)
-        return replace(other, problem=problem, forgotten=counted.first or 0)
-
-    strong = [j for j, one in enumerate(fitted.strong) if one]
-    pairs = Pairs(y=y, valid=counted.valid, fits={}, strong=strong, alike=(), excluded={})
-    for j, fit in enumerate(fitted.fits):
-        pairs.put(j, freed(j, fit))
-    pairs.refine(pairs.kept, None)
-    found = pairs.fits[moving]
-    if not found.best.fit.is_white:
-        washed = washed_out(found.problem, found.best.fit)
-        if washed is None:
-            return None
-        best = replace(found.best, fit=washed)
-        pairs.put(moving, replace(found, best=best, trials=(best,), rivals=(), hidden=None))
-        pairs.refine(pairs.kept, None)
-    return _moved_at_once(pairs) if pairs.fits[moving].best.fit.is_white else None
-
-
 def _moved_at_once(pairs: Pairs) -> OutputFit:
     """Move all pairs at once, noise whitened, until no coupling is dropped; add the error bars."""
     whitening = whitening_of(pairs.residual())
@@ -270,21 +214,15 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
     while pairs.together(whitening):
         pairs.refine(pairs.kept, whitening)
     errors: dict[int, Real] = {}
-    lags: dict[int, Lag | None] = {}
     fits = [pairs.fits[j] for j in pairs.kept]
     if fits:
         problem, blocks, bias = derivatives(fits, whitening)
         errors = dict(zip(pairs.kept, covariances(problem, fits[-1], blocks, bias), strict=True))
-    for k, j in enumerate(pairs.kept):
-        if j not in pairs.strong:
-            others = np.vstack([*blocks[:k], *blocks[k + 1 :], bias])
-            lags[j] = lag_of(problem, fits[k], others)
     everyone = range(len(pairs.fits))
     return OutputFit(
         fits=tuple(pairs.fits[j] for j in everyone),
         covariances=tuple(errors.get(j, np.zeros((0, 0))) for j in everyone),
         strong=tuple(j in pairs.strong for j in everyone),
-        lags=tuple(lags.get(j) for j in everyone),
     )
 
 
@@ -299,17 +237,19 @@ def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit
 def fit_leading(
     inputs: list[Real],
     y: Real,
-    *,
     valid: Mask | None,
-    likeliest: _Likeliest,
     excluded: Collection[int] = (),
+    **options: Any,
 ) -> Led:
-    """Fit the input that an output, (n,), follows most; the others count as noise."""
+    """Fit the input that an output, (n,), follows most; the others count as noise.
+
+    The options are those of `hmpim.identify.fitting.joint.fit_likeliest`.
+    """
     level = bridged(y, valid)
     share = {j: _follows_at_all(u, level) for j, u in enumerate(inputs) if j not in excluded}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
     likely = {j: inputs[j] for j in (*_likely(share), *_likely(sums))}
-    return dict([likeliest(likely, y, valid=valid)])
+    return dict([fit_likeliest(likely, y, valid=valid, **options)])
 
 
 def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
@@ -324,9 +264,6 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
-        own = pairs.fits.get(i)
-        if own is not None and own.related and _leaves_less(own, tried[i]):
-            continue  # it is a coupling
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -342,8 +279,6 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
     """
     waiting = _waiting(inputs, pairs)
     counted = pairs.counted(pairs.strong)
-    if counted is not None and np.count_nonzero(counted) < MOST * counted.size:
-        counted = pairs.valid  # too few samples to test
     constant = constant_of(pairs.fits[pairs.strong[0]])
     found: dict[int, float] = {}
     sums: set[int] = set()
@@ -379,12 +314,6 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     return [j for j, one in share.items() if one >= NEARLY * most]
 
 
-def _leaves_less(one: JointFit, other: JointFit) -> bool:
-    """Whether a fit is clearly likelier than another, as its residual is smaller."""
-    (own, few), (rest, many) = ((f.best.fit.cost, f.problem.counted) for f in (one, other))
-    return bool(0.5 * few * np.log(max(rest / many, 1e-300) / max(own / few, 1e-300)) > CLEARLY)
-
-
 def _is_large(fit: JointFit) -> bool:
     """Whether an input explains a large part of the output without the others."""
     counts = slice(None) if fit.problem.valid is None else fit.problem.valid
@@ -400,16 +329,14 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
 def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
     """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
-    A response so late that it leaves out most of the record explains errors of the stronger inputs'
-    models, such as friction. A pole as slow as the record also explains a drift: it counts only
-    if a drift explains less than the sum does.
+    A pole as slow as the record also explains a drift: it counts only if a drift explains less than
+    the sum does.
     """
     problem, fit = tried.problem, tried.best.fit
-    if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
+    if not spans_record(fit):
+        return tried.related
+    if not (tried.related and summed):
         return False
-    slow = spans_record(fit)
-    if not slow or not summed:
-        return not slow
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])
     drifting = fitted(u, problem.y, valid=problem.valid, nuisance=rows).best.fit
@@ -437,8 +364,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
     others = [inputs[j] for j in weak]
     whitening = whitening_of(rest, others, late=late)
     mode = "zoh" if is_held(mode) else mode  # a coupling receives no feedforward
-    modes = {j: pairs.between.get(j, mode) for j in weak}
-    sources = {j: prepare_input(inputs[j], modes[j]) for j in weak}
+    sources = {j: prepare_input(inputs[j], mode) for j in weak}
     roughly = tuple(name for name in structures if name == "first_order") or structures
     known = all(j in fits for j in weak)
     for names in (structures,) if known else (roughly, structures):  # whitened anew each time
@@ -453,7 +379,7 @@ def _fit_couplings(inputs: list[Real], pairs: Pairs, structures: tuple[Structure
             )
             if names is not structures:
                 problem = pairs.apart(problem, j)
-            fit = coupling_fit(problem, inputs[j], intersample=modes[j], structures=names)
+            fit = coupling_fit(problem, inputs[j], intersample=mode, structures=names)
             pairs.put(j, fit)
         # Test none before all are fitted: inputs that are alike explain each other's share.
         while pairs.together(whitening, drop=names is structures):

@@ -12,10 +12,9 @@ from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import effective_share
-from hmpim.identify.worth import FEW, PART, TWICE
+from hmpim.identify.worth import PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
-from hmpim.record import Intersample
 
 __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
@@ -24,8 +23,7 @@ __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 class Pairs:
     """The pairs of one output during the search; all but `y`, `valid`, `alike`, `excluded` change.
 
-    `alike` is as for `fit_together`. A coupling that was strong keeps its assumption between the
-    samples in `between`.
+    `alike` is as for `fit_together`.
     """
 
     y: Real  # (n,)
@@ -35,7 +33,6 @@ class Pairs:
     alike: Sequence[tuple[frozenset[int], Mask]]
     excluded: Mapping[int, JointFit]  # inputs to leave out
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
-    between: dict[int, Intersample] = field(default_factory=dict)
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
     @property
@@ -83,19 +80,16 @@ class Pairs:
         self.fits[i] = fit
         self.masks[i] = fit.problem.valid if fit.related else None
 
-    def begin(self, led: Mapping[int, JointFit]) -> None:
-        """Start from fits to strong inputs."""
-        for i, fit in led.items():
-            self.put(i, fit)
-            self.strong.append(i)
-
     def resume(self, led: Mapping[int, JointFit], nuisance: Real | None) -> None:
-        """Start from fits with other rows, with `nuisance`, (k, n), as their rows.
+        """Start from fits to strong inputs, with `nuisance`, (k, n), as their rows.
 
-        Which samples count is then decided anew: it may have been decided wrongly.
+        If they had other rows, which samples count is decided anew: it may have been decided
+        wrongly.
         """
-        others = {i: fit for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
-        self.begin({**led, **{i: with_nuisance(fit, nuisance) for i, fit in others.items()}})
+        others = {i for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
+        for i, fit in led.items():
+            self.put(i, with_nuisance(fit, nuisance) if i in others else fit)
+            self.strong.append(i)
         if len(led) > 1 or others:
             self.refine(self.kept, None)
             self.masks.update(dict.fromkeys(led))
@@ -140,26 +134,6 @@ class Pairs:
             moved_fit = before[k].with_fit(found[k])
             self.fits[j] = replace(moved_fit, problem=own, weighed=own, effective_share=share)
         return problems, found
-
-    def demote(self) -> bool:
-        """Treat inputs as couplings again that resemble others and are little above the noise.
-
-        Of two inputs that are alike, the first may have explained a share of the other's response:
-        all couplings are removed, to be fitted before any is tested. Returns whether there are any.
-        """
-        noise, dominant = float(np.sqrt(self.cost)), self.dominant
-        alike = frozenset[int]().union(*(group for group, _ in self.alike))
-        low = [
-            j
-            for j in self.strong[1:]
-            if j in alike - dominant and noise > 2 * FEW * float(np.std(contribution(self.fits[j])))
-        ]
-        for j in low:
-            self.strong.remove(j)
-            self.between[j] = self.fits[j].best.intersample
-        for j in [j for j in self.fits if low and j not in {*self.strong, *self.excluded}]:
-            del self.fits[j]
-        return bool(low)
 
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
         """Move all couplings at once; drop the weakest if it adds nothing; return if dropped."""

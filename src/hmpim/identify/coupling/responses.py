@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -236,11 +236,10 @@ def with_noise_doubted(
 
     All inputs share one residual, so a doubt about it holds for all.
     """
+    elsewhere = {f.code: (one.input, f) for one in pairs for f in one.warnings if _of_the_noise(f)}
     found = []
     for pair, fit in zip(pairs, joined.fits, strict=True):
         known = {finding.code for finding in pair.warnings if _of_the_noise(finding)}
-        others = (other for other in pairs if other is not pair)
-        elsewhere = {f.code: (o.input, f) for o in others for f in o.warnings if _of_the_noise(f)}
         more = tuple(
             replace(
                 finding,
@@ -250,7 +249,7 @@ def with_noise_doubted(
             for code, (source, finding) in elsewhere.items()
             if fit.related and code not in known
         )
-        found.append(replace(pair, warnings=(*pair.warnings, *more)) if more else pair)
+        found.append(replace(pair, warnings=(*pair.warnings, *more)))
     return tuple(found)
 
 
@@ -267,23 +266,13 @@ def settled(
     parameters = pair.parameters
     unknown: list[str] = []
     if not joined.strong[i]:
-        lag = joined.lags[i]
         late, gain = unsettled(joined.fits[i])
         parameters = replace(
             parameters,
             delay=_widened(parameters.delay, late / fs**2),
             scale_factor=_widened(parameters.scale_factor, gain),
         )
-        if lag is not None:
-            seconds = partial(estimate, unit="s")
-            time_constant = seconds(lag.time_constant / fs, (lag.time_constant_std / fs) ** 2)
-            parameters = replace(
-                parameters,
-                delay=seconds(lag.delay / fs, (lag.delay_std**2 + late) / fs**2),
-                time_constant=time_constant if pair.structure == "first_order" else None,
-            )
         parameters, unknown = _determined(parameters, inputs.bands[i])
-    parameters = _finite(parameters)
     findings = list(pair.warnings)
     if unknown:
         bound = _bound(pair.frequency_response)
@@ -367,9 +356,3 @@ def _determined(p: Parameters, band: tuple[float, float]) -> tuple[Parameters, l
         gone |= set(_WITH_GAIN) | {"delay_low_frequency", "delay_correlation"}
     unknown = [name for name in _WITH_GAIN if name in gone and name in known]
     return replace(p, **dict.fromkeys(gone, None)), unknown
-
-
-def _finite(p: Parameters) -> Parameters:
-    """The parameters without those whose error is not finite."""
-    bad = [name for name, e in p.given.items() if not np.isfinite(e.spread)]
-    return replace(p, **dict.fromkeys(bad, None))

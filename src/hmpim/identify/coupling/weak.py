@@ -10,14 +10,14 @@ chosen: it keeps a barely significant pole, and so the wider error bars.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Complex, Real, averaged
-from hmpim.identify.chance import CLEARLY, FALSE_ALARM, searched
+from hmpim.identify.chance import CLEARLY, searched
 from hmpim.identify.fitting.candidates import in_best_sample, nested
 from hmpim.identify.fitting.course import bridged
 from hmpim.identify.fitting.data import TASTE
@@ -27,12 +27,10 @@ from hmpim.identify.fitting.start import RoughResponse, rough_response, starting
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.section_iv.correlation import likeness
-from hmpim.identify.worth import FEW
 from hmpim.model.dynamics import STRUCTURES, StructureName
-from hmpim.model.sampled import delayed_response
 from hmpim.record import Intersample
 
-__all__ = ["Lag", "coupling_fit", "lag_of", "unsettled", "whitening_of"]
+__all__ = ["coupling_fit", "unsettled", "whitening_of"]
 
 _COUPLED: tuple[StructureName, ...] = (*PLAIN, "second_order_high_pass")
 """Structures that a weak coupling may have."""
@@ -54,10 +52,6 @@ _ALIKE = 1e-6
 is left out."""
 
 _STEPS = 25
-
-_POINTS = 16
-_EARLIEST = -1.0
-"""Smallest delay of a coupling, in samples: causal, within the error of time stamps."""
 
 
 def whitening_of(residual: Real, inputs: Sequence[Real] = (), *, late: float = 0.0) -> Real | None:
@@ -125,8 +119,6 @@ def coupling_fit(
     rough = rough_response(moves, answer, longest_delay=longest)
     fits: list[Fit] = []
     tried = tuple(name for name in structures if name in _COUPLED) or _COUPLED
-    if not np.any(rough.response):  # nothing that could show a pole
-        tried = ("static",)
     for name in sorted(tried, key=lambda name: STRUCTURES[name].order):
         structure, seen = STRUCTURES[name], rough
         if structure.dc_zeros:  # a plain second order, driven by the input's acceleration
@@ -219,80 +211,3 @@ def _akaike(problem: Problem, fit: Fit) -> float:
     count = problem.counted
     price = 2 * fit.structure.parameters + (CLEARLY if fit.structure.order > 1 else 0.0)
     return float(count * np.log(max(fit.objective, tiny) / count) + price)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lag:
-    """Mean and standard deviation of delay and lag, averaged over all lags, in samples."""
-
-    delay: float
-    delay_std: float
-    time_constant: float
-    time_constant_std: float
-
-
-def lag_of(problem: Problem, pair: JointFit, others: Real) -> Lag | None:
-    """Average over lags of a coupling; None of two poles, of software, or if no lag is possible.
-
-    At low frequencies, where a weak coupling is known best, a delay and a first-order lag have the
-    same phase. The likeliest split between them then means little, and its error bars less: a lag
-    of zero looks certain where it is only not visible. So the likelihood is summed over all lags,
-    each with its own best delay (a flat prior on the lag: Sivia and Skilling, Data Analysis,
-    2nd ed., Oxford 2006, ch. 3).
-
-    The problem has the samples that count and the whitening; `others`, (k, n), are the whitened
-    derivatives by all other parameters, which stay free.
-    """
-    fit = pair.best.fit
-    if fit.structure.name not in ("static", "first_order"):
-        return None
-    if pair.best.intersample == "sampled":  # software is late by whole samples
-        return None
-    problem = replace(pair.problem, valid=problem.valid, whitening=problem.whitening)
-    basis, _ = np.linalg.qr(others.T)
-
-    def clean(rows: Real) -> Real:
-        counted = problem.masked(rows)
-        return np.asarray(counted - (counted @ basis) @ basis.T)
-
-    y = clean(problem.y)
-    total = fit.delay + (float(np.exp(fit.theta[1])) if fit.theta.size > 1 else 0.0)
-    top = max(2.0 * total, 4.0)
-    for _ in range(2):  # the second time, only as far as any lag was likely
-        found: list[tuple[float, float, float, float]] = []
-        for lag in top * (np.arange(_POINTS) / (_POINTS - 1.0)):
-            delay = total - float(lag)
-            rows = _lag_rows(problem, delay, max(float(lag), FEW))
-            counted = clean(rows)
-            gram = counted @ counted.T
-            if not np.linalg.cond(gram / np.sqrt(np.outer(np.diag(gram), np.diag(gram)))) < 1e10:
-                continue
-            gain, slope = np.linalg.solve(gram, counted @ y)
-            residual = y - np.array([gain, slope]) @ counted
-            shift = -slope / gain
-            variance = float(np.linalg.inv(gram)[1, 1]) / gain**2
-            found.append((float(lag), delay + shift, variance, float(residual @ residual)))
-        likely = [point for point in found if point[1] >= _EARLIEST]
-        if not likely:
-            return None
-        lags, delays, variances, costs = np.array(likely).T.copy()
-        sigma2 = float(costs.min()) / max(problem.counted - others.shape[0] - 3, 1)
-        weight = np.exp(-0.5 * (costs - costs.min()) / sigma2)
-        top = min(1.3 * float(lags[weight > FALSE_ALARM].max()) + FEW, top)
-    variances *= sigma2
-    weight /= weight.sum()
-    delay, lag = float(weight @ delays), float(weight @ lags)
-    step = lags[1] - lags[0] if lags.size > 1 else 0.0
-    return Lag(
-        delay=delay,
-        delay_std=float(np.sqrt(weight @ (variances + (delays - delay) ** 2) + step**2 / 12)),
-        time_constant=lag,
-        time_constant_std=float(np.sqrt(weight @ (lags - lag) ** 2 + step**2 / 12)),
-    )
-
-
-def _lag_rows(problem: Problem, delay: float, lag: float) -> Real:
-    """Responses of e^(-sτ)/(1 + Ts) and of s times that, with the level before the record."""
-    rows = delayed_response(problem.source, delay=delay, denominator=np.array([1.0, lag]), powers=2)
-    rows[0] += problem.source.first
-    return rows

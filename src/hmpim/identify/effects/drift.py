@@ -14,7 +14,6 @@ import scipy
 from numpy.polynomial.legendre import legvander
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import LIKELIER
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
@@ -44,7 +43,6 @@ _FEWEST = 100
 
 _Begun = Callable[[Real], tuple[Problem, Fit]]
 _Fitted = Callable[[Real, bool], JointFit]
-_Steadily = Callable[[JointFit], JointFit | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,21 +54,15 @@ class Drifting:
     # mean rate over the record and its standard deviation, in the output's unit per sample
     rate: float
     rate_std: float
-    rival: Fit | None  # the fit with a constant bias, if the odds against it are below 20
 
 
-def with_drift(
-    first: JointFit, fitted: _Fitted, steadily: _Steadily
-) -> tuple[JointFit, Drifting | None]:
+def with_drift(first: JointFit, fitted: _Fitted) -> tuple[JointFit, Drifting | None]:
     """Fit again with a drifting bias, if the first fit suggests one and the criterion improves.
 
     `first` has a constant bias. `fitted` makes the joint fit with rows for the drift, of plain
-    structures only if its second argument is true. `steadily` turns a joint fit with a drift into
-    one with a constant bias and a free initial state, or a washout; None if neither leaves white
-    noise.
+    structures only if its second argument is true.
 
-    Returns the chosen fit and the drift; None for the drift if a constant bias is enough. Even
-    then the fit may be a new one: with a drift, the search may find dynamics that it missed.
+    Returns the chosen fit and the drift; None for the drift if a constant bias is enough.
     """
     if not _may_drift(first):
         return first, None
@@ -89,22 +81,17 @@ def with_drift(
         gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
         if gain < 0.0:
             return first, None
-    rival = first.best.fit if gain < 2 * LIKELIER else None
-    return _unless_steady(joint, columns, steadily, rival)
+    return _without_drift(joint, columns)
 
 
 def with_plain_drift(
-    problem: Problem,
-    fit: Fit,
-    begun: _Begun,
-    fitted: Callable[[Real], JointFit],
-    steadily: _Steadily = lambda _: None,
-) -> tuple[JointFit, Drifting | None] | None:
+    problem: Problem, fit: Fit, begun: _Begun, fitted: Callable[[Real], JointFit]
+) -> tuple[JointFit, Drifting] | None:
     """Add a drift to plain dynamics; keep it if that leaves white noise.
 
     `problem` and `fit` are the data and the best plain fit with a constant bias. `begun` makes the
     plain fits with rows for the drift and returns the best of them and its data; `fitted` makes the
-    joint fit of plain structures. `steadily` and the values are as for `with_drift`.
+    joint fit of plain structures. The values are as for `with_drift`.
 
     None if a constant bias is enough, if the model is as slow as a drift, or if the residual is not
     white.
@@ -120,16 +107,11 @@ def with_plain_drift(
     gain = criterion_gain(joint, len(columns), fit, problem)
     if gain < 0.0:
         return None
-    return _unless_steady(joint, columns, steadily, fit if gain < 2 * LIKELIER else None)
+    return _without_drift(joint, columns)
 
 
-def _unless_steady(
-    joint: JointFit, columns: Real, steadily: _Steadily, rival: Fit | None
-) -> tuple[JointFit, Drifting | None]:
-    """Subtract the drift from the fit, or return one with a constant bias that explains as much."""
-    steady = steadily(joint)
-    if steady and criterion_gain(joint, len(columns), steady.best.fit, steady.problem) < 0.0:
-        return steady, None
+def _without_drift(joint: JointFit, columns: Real) -> tuple[JointFit, Drifting]:
+    """Subtract the drift from the fit."""
     weighed, fit = joint.weighed, joint.best.fit
     weights = fit.nuisance[: len(columns)]
     others = jacobian(replace(weighed, nuisance=weighed.fixed()[1 + len(columns) :]), fit)
@@ -147,7 +129,6 @@ def _unless_steady(
         steady=len(columns) == 1,
         rate=float(across @ weights),
         rate_std=float(np.sqrt(max(float(across @ errors @ across), 0.0))),
-        rival=rival,
     )
     # The rows of the drift stay free; the bias is the mean.
     return without_rows(joint, slice(len(columns))), drifting

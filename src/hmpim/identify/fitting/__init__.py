@@ -13,7 +13,6 @@ beginning       which samples count, and whether the record begins at rest
 whitening       the noise of all trials
 trial           all trials, and the choice among them
 plainer         plain structures next to a rich one
-washout         a washout in place of a drift
 unrelated       whether an output follows its input at all
 halves          whether the halves of a record agree
 """

@@ -17,7 +17,7 @@ _SHIFTED = (*PHASE_SPLIT, "delay_low_frequency", "bandwidth_phase90")
 def other_intersample(evidence: Evidence) -> Iterator[Finding]:
     """Name the assumptions that fit as well: the intervals cover them."""
     best, rivals = evidence.joint.best, []
-    for trial in rivals_of(evidence.joint, evidence.owed):
+    for trial in rivals_of(evidence.joint):
         name = trial.fit.structure.name
         other = name if name != best.fit.structure.name else ""
         rivals.append((trial.intersample, trial.fit.delay - best.fit.delay, other))
@@ -35,8 +35,9 @@ def undetermined_between(
     moves = []
     for mode, apart, other in rivals:
         if other or abs(apart) > FEW:
-            model = f"{_a_model(other)} and " if other else ""
-            moves.append(f"{INTERSAMPLE_WORDS[mode]}, with {model}{_delay(apart)}")
+            model = f"a {structure_in_words(other)} model and " if other else ""
+            delay = f"a delay {abs(apart):.2f} samples {'longer' if apart > 0.0 else 'shorter'}"
+            moves.append(f"{INTERSAMPLE_WORDS[mode]}, with {model}{delay}")
     if not moves:
         return
     yield Finding(
@@ -50,30 +51,14 @@ def undetermined_between(
     )
 
 
-def _a_model(structure: str) -> str:
-    """Name a structure, with its remark last: 'a first-order model (with a zero)'."""
-    name, _, remark = structure_in_words(structure).partition(" (")
-    return f"a {name} model" + (f" ({remark}" if remark else "")
-
-
-def _delay(apart: float) -> str:
-    """Compare a delay that is `apart` samples longer with the stated one."""
-    size = f"{abs(apart):.2f}"
-    if size == "0.00":
-        return "the same delay"
-    return f"a delay {size} samples {'longer' if apart > 0.0 else 'shorter'}"
-
-
 def wide_span(evidence: Evidence) -> Iterator[Finding]:
     """Doubt figures that differ widely among the models that the record allows."""
     wide: dict[str, str] = {}
     for name in SIZES:
         estimate, own = getattr(evidence.spanned, name), getattr(evidence.readings.parameters, name)
-        if estimate is None or own is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
+        if estimate is None or estimate.ci95 is None or estimate.ci95 == own.ci95:
             continue
         low, high = estimate.ci95
-        if own.spread > abs(own.value):  # undetermined, which another check reports
-            continue
         if low is None or high is None:  # a model lacks it
             wide[name] = f"below {high:.4g}" if low is None else f"above {low:.4g}"
         elif high - low > PART * abs(estimate.value):
@@ -81,7 +66,7 @@ def wide_span(evidence: Evidence) -> Iterator[Finding]:
     if not wide:
         return
     named = ", ".join(f"{in_words(name)} {span}" for name, span in wide.items())
-    between = bool(rivals_of(evidence.joint, evidence.owed))
+    between = bool(rivals_of(evidence.joint))
     yield Finding(
         code="intersample" if between else "structure",
         message=f"Models that this record cannot distinguish differ widely: {named}. "

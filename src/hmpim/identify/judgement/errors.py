@@ -31,8 +31,6 @@ def weak_excitation(evidence: Evidence) -> Iterator[Finding]:
         estimate: Estimate | None = getattr(p, name)
         if estimate is None or estimate.spread <= MUCH * abs(estimate.value):
             continue
-        if name == "time_constant" and p.natural_frequency is not None:
-            continue
         yield Finding(
             code="weak_excitation",
             message=f"{_how_well(in_words(name), estimate)}. Excite more around the natural "

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import FALSE_ALARM, HALF
+from hmpim.identify.chance import HALF
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.misfit import Misfit
@@ -65,12 +65,6 @@ class Evidence:
     def unexplained(self) -> float:
         """R.m.s. of the residual over that of the output about its mean."""
         return 1.0 - self.fit_percent / 100.0
-
-    @property
-    def owed(self) -> float:
-        """Share of the residual's power that follows the input; 0 if insignificant or small."""
-        significant = self.misfit.probability < FALSE_ALARM and self.misfit.share > 2 * FEW
-        return self.misfit.share if significant else 0.0
 
     @property
     def is_without_noise(self) -> bool:

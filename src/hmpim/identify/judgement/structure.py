@@ -125,7 +125,7 @@ def missed_tail(evidence: Evidence) -> Iterator[Finding]:
     A slow tail hardly changes the response within the band.
     """
     joint, fs = evidence.joint, evidence.fs
-    if evidence.nonlinear > MOST or not evidence.has_samples:
+    if evidence.nonlinear > MOST:
         return
     tail = hidden_tail(joint.weighed, joint.best.fit, share=joint.weighed_share)
     if tail is None or tail.size <= MATERIAL:

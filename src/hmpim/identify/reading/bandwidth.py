@@ -142,13 +142,13 @@ def response_bandwidths(
     )
 
 
-def are_apart(measured: Estimate | None, modelled: Estimate | None) -> bool:
+def are_apart(measured: Estimate | None, modelled: Estimate) -> bool:
     """Whether a bandwidth of the response and the model's differ beyond their error bars.
 
     A measured bandwidth with a wide interval contradicts nothing; an example is an input that is
     barely distinguished from another one.
     """
-    if measured is None or modelled is None or HALF * measured.spread > PART * measured.value:
+    if measured is None or HALF * measured.spread > PART * measured.value:
         return False
     allowed = DEVIATIONS * float(np.hypot(measured.spread, modelled.spread))
     return not abs(measured.value - modelled.value) <= max(allowed, TOLERATED * modelled.value)

@@ -1,6 +1,5 @@
 """Parameters of the result, read off the fitted model, each with its error bar."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
 from hmpim.identify.noise.level import steadiness
 from hmpim.identify.noise.whiteness import is_steady, is_white
-from hmpim.identify.reading.figures import gradient, read_figures, variance_of
+from hmpim.identify.reading.figures import read_figures
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.error_bars import noise_estimate
 from hmpim.model.filters import in_z
@@ -41,11 +40,6 @@ class Readings:
     innovations: Real  # (n,): the residual, whitened
     # (q, q): of the delay and the coefficients of `system` that may vary, by rising powers of s
     coefficient_covariance: Real
-
-    def variance(self, function: Callable[[Real], float]) -> float:
-        """Variance of a function of `vector`, to first order."""
-        slope = gradient(function, self.vector)
-        return variance_of(slope, self.covariance)
 
     @property
     def coefficients(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Real
-from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER, SEEN
+from hmpim.identify.chance import CLEARLY, COVERAGE, HALF, LIKELIER
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import adjusted_for_pole, as_if_hidden, as_if_zero
@@ -44,26 +44,25 @@ _FAST = ("natural_frequency", "damping_ratio", *BANDWIDTHS)
 """Figures that grow without limit as a second pole becomes infinitely fast, bandwidths last."""
 
 
-def rivals_of(joint: JointFit, owed: float = 0.0) -> tuple[Trial, ...]:
+def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
     """The likeliest trial under each other assumption that the record does not exclude.
 
     Software has one assumption: there these are all filters and delays that are about as likely.
-    `owed` is the share of the best trial's residual that still follows the input: no model here
-    describes it, it is not noise, and a smaller difference excludes nothing.
     """
     best = joint.best
     if best.fit.structure.sampled:
-        return tuple(t for t in joint.trials if t is not best and _is_as_likely(t, joint))
+        return tuple(
+            t
+            for t in joint.trials
+            if t is not best
+            and t.criterion - best.criterion < 2 * LIKELIER
+            and t.fit.structure.parameters <= best.fit.structure.parameters
+        )
     others: dict[str, Trial] = {}
     for trial in sorted(joint.trials, key=lambda trial: trial.criterion):
         if trial.intersample != best.intersample:
             others.setdefault(trial.intersample, trial)
-    most = (1.0 + owed) * best.fit.objective if owed else 0.0
-    return tuple(
-        t
-        for t in others.values()
-        if t.criterion - best.criterion < 2 * CLEARLY or t.fit.objective < most
-    )
+    return tuple(t for t in others.values() if t.criterion - best.criterion < 2 * CLEARLY)
 
 
 def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
@@ -108,14 +107,6 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
     return tuple(filter(is_better, joint.trials))
 
 
-def _is_as_likely(trial: Trial, joint: JointFit) -> bool:
-    """Whether another filter or delay may be the true one; surplus taps must have an effect."""
-    behind = trial.criterion - joint.best.criterion
-    extra = trial.fit.structure.parameters - joint.best.fit.structure.parameters
-    price = float(np.log(joint.problem.counted * joint.effective_share))
-    return behind < 2 * LIKELIER and (extra <= 0 or extra * price - behind > SEEN * extra)
-
-
 def spanned(
     parameters: Parameters,
     joint: JointFit,
@@ -124,22 +115,20 @@ def spanned(
     highest: float,
     bent: Iterable[tuple[Fit, Real]] = (),
     others: Iterable[Fit] = (),
-    owed: float = 0.0,
 ) -> Parameters:
     """Widen each interval to cover the other assumptions and one more pole.
 
     The other fits have almost the same sensitivity to the data, so that each interval of the best
     trial's parameters is moved to their value, with its width unchanged. `bent` holds linear fits,
     each with the change of its parameters, (p,), by a possible nonlinearity; `others` are fits with
-    a gain that may have changed, or a bias that may have drifted. Beyond `highest`, in Hz, no
-    bandwidth is read off; `owed` is as for `rivals_of`.
+    a gain that may have changed. Beyond `highest`, in Hz, no bandwidth is read off.
     """
 
     def figures(fits: Iterable[Fit]) -> list[dict[str, float | None]]:
         # The bandwidth of another model may lie beyond the band.
         return [_or_beyond(figures_of(fit, fs=fs, highest=fs / 2), fit) for fit in fits]
 
-    rivals = rivals_of(joint, owed)
+    rivals = rivals_of(joint)
     between = figures(trial.fit for trial in rivals)
     between += figures(fit for rival in rivals for fit in _ends(rival))
     richer = figures(
