@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM
@@ -25,7 +26,7 @@ _PAST, _FUTURE = slice(0, _AHEAD + 2), slice(_AHEAD + 2, None)
 """Rows of a constant with the past of the input, and of its future."""
 
 _AT_ONCE = 20_000
-"""Samples whose lags are in memory at once."""
+"""Missing samples whose lags are in memory at once."""
 
 
 def feedback(evidence: Evidence) -> Iterator[Finding]:
@@ -101,12 +102,15 @@ def _by_samples(u: Real, residual: Real, counts: Mask | None) -> float:
 
 def _by_products(u: Real, residuals: Real, counts: Mask | None) -> Real:
     """The chances by the products of lags, of which the input's are computed once."""
-    counted = _inner(u, counts)
-    size, direction, predicted = _future_of(u, counted)
+    lost = np.flatnonzero([] if counts is None else ~counts[_AHEAD:-_AHEAD])
+    size, direction, predicted = _future_of(u, lost)
     if not size.size or not residuals.shape[0]:
         return np.ones(residuals.shape[0])
-    inner = residuals[:, _AHEAD:-_AHEAD] * counted
-    count = np.count_nonzero(counted)
+    inner = residuals[:, _AHEAD:-_AHEAD]
+    if lost.size:
+        inner = inner.copy()
+        inner[:, lost] = 0.0
+    count = inner.shape[1] - lost.size
     mean = inner.sum(axis=1) / count
     variance = np.vecdot(inner, inner) / count - mean**2
     moves = u - u.mean()
@@ -126,15 +130,31 @@ def _distinct(products: Real, power: float) -> tuple[Real, Real]:
 
 
 @kept
-def _future_of(u: Real, counted: Mask) -> tuple[Real, Real, Real]:
+def _future_of(u: Real, lost: NDArray[np.intp]) -> tuple[Real, Real, Real]:
     """Eigenvalues and vectors of the unpredicted part of the future, and the predictor."""
-    moves, gram = u - u.mean(), np.zeros((2 * _AHEAD + 2, 2 * _AHEAD + 2))
-    for begin in range(0, counted.size, _AT_ONCE):
-        places = begin + np.flatnonzero(counted[begin : begin + _AT_ONCE])
-        lags = moves[places + np.arange(2 * _AHEAD + 1)[:, None]]
+    gram = _gram(u - u.mean())
+    for begin in range(0, lost.size, _AT_ONCE):
+        places = lost[begin : begin + _AT_ONCE]
+        lags = (u - u.mean())[places + np.arange(2 * _AHEAD + 1)[:, None]]
         rows = np.concatenate([np.ones((1, places.size)), lags])
-        gram += rows @ rows.T
+        gram -= rows @ rows.T
     # The Schur complement is the part of the future that the past does not predict.
     predicted = solved(gram[_PAST, _PAST], gram[_PAST, _FUTURE])
     unpredicted = gram[_FUTURE, _FUTURE] - gram[_FUTURE, _PAST] @ predicted
     return *_distinct(unpredicted, float(np.trace(gram) - gram[0, 0])), predicted
+
+
+def _gram(u: Real) -> Real:
+    """Products of a constant and an input's lags, past first, over all samples that have them."""
+    samples = u.size - 2 * _AHEAD
+    head, tail = u[: 2 * _AHEAD], u[samples:]
+    gram = np.empty((2 * _AHEAD + 2, 2 * _AHEAD + 2))
+    gram[0, 0], gram[0, 1] = samples, u[:samples].sum()
+    gram[0, 2:] = gram[0, 1] + np.cumsum(tail - head)
+    gram[1, 1:] = np.correlate(u, u[:samples], "valid")
+    gram[1:, :2] = gram[:2, 1:].T
+    # From lag to lag a product gains a term at its end, and loses its first.
+    change = np.outer(tail, tail) - np.outer(head, head)
+    for k in range(2, gram.shape[0]):
+        gram[k, 2:] = gram[k - 1, 1:-1] + change[k - 2]
+    return gram
