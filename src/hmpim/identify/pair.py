@@ -35,7 +35,7 @@ from hmpim.identify.nonlinear.speed import speed_finding
 from hmpim.identify.nonlinearities import looked_through, possible_bends
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.preparation.reference import response_through
-from hmpim.identify.reading.bandwidth import disagreeing, less_bias, response_bandwidths
+from hmpim.identify.reading.bandwidth import beside_model, response_bandwidths
 from hmpim.identify.reading.readings import Readings, read_parameters
 from hmpim.identify.reading.spanned import blurred, spanned, without_noise
 from hmpim.identify.result import (
@@ -162,20 +162,6 @@ class _Followed:
             residual = residual * self.joined.gaining.course
         return prediction, residual
 
-    def response_to(self, y: Real, fit: Fit) -> FrequencyResponse:
-        """Local response; that of an integrator from the output's differences.
-
-        An integrating output does not end where it began, and that step leaks into every bin.
-        """
-        u, fs, band = self.source.values, self.question.aligned.fs, self.band
-        delay = fit.delay / fs
-        if not fit.structure.integrators:
-            return local_response(u, y, fs, delay=delay, band=band)
-        steps = local_response(u, np.diff(y, prepend=y[0]), fs, delay=delay, band=band)
-        difference = 1.0 - np.exp(-2j * np.pi * steps.frequency / fs)
-        response, std = steps.response / difference, steps.std / np.abs(difference)
-        return replace(steps, response=response, std=std)
-
 
 def _pair(own: _Followed) -> PairIdentification:
     """Describe an output that follows an input."""
@@ -197,7 +183,14 @@ def _pair(own: _Followed) -> PairIdentification:
     response = _measured(own, joint, readings)
     bent = partial(possible_bends, question, own.found, joint, own.i, plain, said)
     moves, unmoved = attempt("bends", bent, ())
-    read = partial(_bandwidths, own, joint, readings, response)
+    read = partial(
+        response_bandwidths,
+        response,
+        readings.system,
+        readings.parameters,
+        fs=aligned.fs,
+        intersample=joint.best.intersample,
+    )
     from_response, unread = attempt("response_bandwidths", read, ResponseBandwidths())
     left, untested = attempt("misfit", partial(_left, own, joint), Misfit())
     evidence = _evidence(own, joint, readings, from_response, left, moves, inspection)
@@ -328,35 +321,6 @@ def _left(own: _Followed, joint: JointFit) -> Misfit:
     return misfit(own.source.values, fit.residual, delay=fit.delay, band=(low / fs, high / fs))
 
 
-def _bandwidths(
-    own: _Followed, joint: JointFit, readings: Readings, response: FrequencyResponse
-) -> ResponseBandwidths:
-    """Bandwidths of the measured response, less the estimator's bias if the model's differ.
-
-    Between lines, and next to a notch of the input, a local fit is biased whatever the noise. The
-    bias is that which it has when the record is the model's own output.
-    """
-    question, fit = own.question, joint.best.fit
-
-    def read(seen: FrequencyResponse) -> ResponseBandwidths:
-        return response_bandwidths(
-            seen,
-            readings.system,
-            readings.parameters,
-            fs=question.aligned.fs,
-            intersample=joint.best.intersample,
-        )
-
-    found = read(response)
-    if question.instrument is not None or not disagreeing(found, readings.parameters):
-        return found
-    if own.matrix is None:
-        of_model = own.response_to(fit.prediction, fit)
-    else:
-        of_model = own.matrix.of_models()[own.i]
-    return less_bias(found, read(of_model), readings.parameters)
-
-
 def _refined(own: _Followed) -> tuple[JointFit, CensoredFit | None, Real | None]:
     """The fit with the likelihood of clipped and held samples, and its covariance if known."""
     question, joined = own.question, own.joined
@@ -373,23 +337,29 @@ def _refined(own: _Followed) -> tuple[JointFit, CensoredFit | None, Real | None]
 
 
 def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyResponse:
-    """Local response; the model replaces samples that are not informative, and its error is added.
+    """The model's response and the local response of the residual.
 
-    Noise decides which samples near a level are clipped, so the others are not a fair selection.
-    The model alone in their place would pull the response towards the level.
+    The residual is linear in the output, and so is a local fit: together they are the response of
+    the output, but what biases a local fit (few lines, a notch of the input, motion before or after
+    the record) then biases only what the model misses.
+
+    Noise decides which samples near a level are clipped, so the others are not a fair selection:
+    their expected residual takes their place, and the model's error is added.
     """
-    if own.matrix is not None:
-        return own.matrix.columns[own.i]
-    question, fit, y = own.question, joint.best.fit, joint.problem.y  # without the drift
+    question, fit, u = own.question, joint.best.fit, own.source.values
     fs = question.aligned.fs
     if question.instrument is not None:
-        return response_through(question.instrument, y, fs, band=own.band)
+        return response_through(question.instrument, joint.problem.y, fs, band=own.band)
+    if own.matrix is None:
+        left = local_response(u, fit.residual, fs, delay=fit.delay / fs, band=own.band)
+    else:
+        left = own.matrix.columns[own.i]
+    response = beside_model(left, readings.system, fs=fs, intersample=joint.best.intersample)
+    if own.matrix is not None:
+        return response
     counted = own.found.counting(np.asarray(question.output.valid), fs)
-    if counted is None:
-        return own.response_to(y, fit)
-    response = own.response_to(np.where(counted, y, fit.prediction + fit.residual), fit)
     covariance = readings.coefficient_covariance
-    if not np.isfinite(covariance).all():
+    if counted is None or not np.isfinite(covariance).all():
         return response
     model_std = response_std(readings.system, covariance, response.frequency)
     return replace(response, std=np.hypot(response.std, model_std))

@@ -51,13 +51,12 @@ _OF_THE_RESIDUAL = frozenset({"lack_of_fit", "unsampled_input", "uneven_noise", 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Responses:
-    """Response of one output to each input, and how much of it all inputs explain."""
+    """Response of the residual to each input, and how much of the output all inputs explain."""
 
     # one for each input, where it excites and is distinguished; with the partial coherence
     columns: tuple[FrequencyResponse, ...]
     coherence: OutputCoherence  # the multiple one
     left: Callable[[], tuple[Misfit, ...]]  # how far the residual still follows each input
-    of_models: Callable[[], tuple[FrequencyResponse, ...]]  # columns for the models' prediction
 
 
 def inputs_of(aligned: Aligned, record: Record) -> InputSet:
@@ -88,12 +87,6 @@ def responses_of(
     `counts` are the samples that show the output as it was, (n,); None if all do.
     """
     pieces = _pieces(aligned, output, counts, joined, inputs)
-
-    def of_models() -> tuple[FrequencyResponse, ...]:
-        predicted = replace(output, values=joined.prediction)
-        alone = _pieces(aligned, predicted, counts, joined, inputs)
-        return tuple(_column(alone, j) for j in range(len(aligned.inputs)))
-
     return Responses(
         columns=tuple(_column(pieces, j) for j in range(len(aligned.inputs))),
         coherence=OutputCoherence(
@@ -108,7 +101,6 @@ def responses_of(
                 [(low / aligned.fs, high / aligned.fs) for low, high in inputs.bands],
             )
         ),
-        of_models=cache(of_models),
     )
 
 
@@ -124,9 +116,9 @@ def _pieces(
     leading = joined.fits[joined.leading].best.fit
     delay = min(max(leading.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
-    y, whole = output.values, joined.prediction
+    y, left = output.values, output.values - joined.prediction
     if joined.disturbance is not None:
-        y, whole = y - joined.disturbance, whole - joined.disturbance
+        y = y - joined.disturbance
     span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
     pieces: list[tuple[list[int], JointResponse]] = []
@@ -135,18 +127,15 @@ def _pieces(
         bins = (high - low) * span
         if not active or bins < 8 * (len(active) + 1) + 2:
             continue
-        rest, modelled = y, whole
-        for j, part in enumerate(parts):
-            if j not in active and joined.fits[j].related:
-                rest, modelled = rest - part, modelled - part
+        others = [j for j, fit in enumerate(joined.fits) if j not in active and fit.related]
         found = joint_response(
             np.stack([aligned.inputs[j].values for j in active]),
-            rest,
+            y - sum(parts[j] for j in others),
+            left,
             aligned.fs,
             delay=delay,
             band=(low, high),
             valid=counts,
-            fill=modelled,
             names=[*(aligned.inputs[j].name for j in active), output.name],
         )
         pieces.append((active, found))
@@ -154,7 +143,7 @@ def _pieces(
 
 
 def _column(pieces: list[tuple[list[int], JointResponse]], j: int) -> FrequencyResponse:
-    """One input's response at the frequencies where the inputs are distinguished."""
+    """The residual's response to an input, where the inputs are distinguished."""
     parts = [piece.inputs[active.index(j)] for active, piece in pieces if j in active]
     return FrequencyResponse(
         frequency=_joined([part.frequency for part in parts]),

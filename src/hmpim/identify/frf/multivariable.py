@@ -85,25 +85,28 @@ class _Joint:
 def joint_response(
     inputs: Real,
     y: Real,
+    left: Real,
     fs: float,
     *,
     delay: float,
     band: tuple[float, float],
     valid: Mask | None,
-    fill: Real,
     names: Sequence[str],
 ) -> JointResponse:
-    """Return the responses of an output to all inputs of one simultaneous test.
+    """Return the responses of a model's residual to all inputs of one simultaneous test.
 
-    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output,
-    (n,), follows them by a delay in s, not negative; a rough value suffices. Where it is not
-    `valid`, (n,), it is taken from `fill`, (n,), a model's prediction with the bias. `names` are
-    those of the inputs, then of the output, for messages. Inputs that are multiples or sums of
-    others over the whole band are refused, and so is a band with too few bins.
+    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output
+    `y`, (n,), of which the coherences are the share explained, and the residual `left`, (n,),
+    follow them by a delay in s, not negative; a rough value suffices. Where the output is not
+    `valid`, (n,), the model replaces it. `names` are those of the inputs, then of the output, for
+    messages. Inputs that are multiples or sums of others over the whole band are refused, and so is
+    a band with too few bins.
     """
     m, samples = inputs.shape
     check_band(band, fs)
-    y, share = _filled(y, valid, fill, names[-1])
+    share = _share(valid, names[-1])
+    if valid is not None:
+        y, left = np.where(valid, y, y - left), np.where(valid, left, 0.0)
     base = int(np.floor(delay * fs + 1e-9))
     step = fs / (samples - base)
     bins = (samples - base - 1) // 2 + 1
@@ -116,7 +119,8 @@ def joint_response(
     _refuse_identical(inputs, low, high, names[:-1])
     centre = centres_in_band(low, high, _POINTS)
     moved = _moved(inputs, delay * fs, base)
-    response, variance, condition, coherence = _chosen(moved, y[base:], centre)
+    coherence = _chosen(moved, y[base:], centre)[-1]
+    response, variance, condition, _ = _chosen(moved, left[base:], centre)
     frequency = centre * step
     usable = np.maximum(_input_condition(moved, centre), condition) <= _WORST
     response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
@@ -137,13 +141,13 @@ def joint_response(
     )
 
 
-def _filled(y: Real, valid: Mask | None, fill: Real, name: str) -> tuple[Real, float]:
-    """An output with its gaps filled, (n,), and the share of it that was measured."""
+def _share(valid: Mask | None, name: str) -> float:
+    """Share of an output that was measured."""
     if valid is None:
-        return y, 1.0
+        return 1.0
     if (measured := int(np.count_nonzero(valid))) < _FEWEST:
         raise RecordError(f"{name} has {measured} valid samples; at least {_FEWEST} are needed")
-    return np.where(valid, y, fill), float(valid.mean())
+    return float(valid.mean())
 
 
 def _refuse_identical(u: Real, low: int, high: int, names: Sequence[str]) -> None:

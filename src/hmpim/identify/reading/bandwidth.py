@@ -22,8 +22,8 @@ from hmpim.record import Intersample
 
 __all__ = [
     "are_apart",
+    "beside_model",
     "disagreeing",
-    "less_bias",
     "ratio_at",
     "response_bandwidths",
     "sampled_response",
@@ -76,6 +76,14 @@ def sampled_response(
     else:
         samples = discretise(rest, fs=fs, intersample=intersample).response(frequency)
     return np.asarray(samples * np.exp(-2j * np.pi * frequency * whole))
+
+
+def beside_model(
+    left: FrequencyResponse, system: RationalDelay, *, fs: float, intersample: Intersample
+) -> FrequencyResponse:
+    """Return the response of an output: the model's, and that measured on the model's residual."""
+    modelled = sampled_response(system, left.frequency, fs=fs, intersample=intersample)
+    return replace(left, response=left.response + modelled)
 
 
 def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:
@@ -157,21 +165,3 @@ def are_apart(measured: Estimate | None, modelled: Estimate) -> bool:
 def disagreeing(measured: ResponseBandwidths, modelled: Parameters) -> bool:
     """Whether any bandwidth of the response differs from the model's."""
     return any(are_apart(getattr(measured, name), getattr(modelled, name)) for name in BANDWIDTHS)
-
-
-def less_bias(
-    measured: ResponseBandwidths, own: ResponseBandwidths, modelled: Parameters
-) -> ResponseBandwidths:
-    """Bandwidths of the response without the estimator's bias, which is added to their error.
-
-    The bias is the difference between `own`, from the model's output without noise, and `modelled`.
-    """
-
-    def corrected(name: str) -> Estimate | None:
-        found, biased, true = (getattr(each, name) for each in (measured, own, modelled))
-        if found is None or biased is None or true is None:
-            return None
-        bias = biased.value - true.value
-        return estimate(found.value - bias, found.spread**2 + bias**2, unit="Hz")
-
-    return ResponseBandwidths(**{name: corrected(name) for name in BANDWIDTHS})
