@@ -1,6 +1,6 @@
 """Fit an output: all structures, and hum, a drift or levels where the residual requires them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,11 +11,10 @@ from hmpim.identify.coupling.output_fit import (
     Led,
     OutputFit,
     fit_in_motion,
-    fit_leading,
     fit_together,
     without_slow,
 )
-from hmpim.identify.effects.disturbance import criterion_gain, without_rows
+from hmpim.identify.effects.disturbance import without_rows
 from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
 from hmpim.identify.effects.imperfections import (
@@ -24,7 +23,6 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -32,14 +30,12 @@ from hmpim.identify.fitting.course import (
     continue_between,
     continued,
     free_from_wander,
-    resumed,
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows
+from hmpim.identify.fitting.data import Fits
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
-from hmpim.identify.fitting.tail import hidden_tail
+from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -50,7 +46,7 @@ from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 
-__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "lead", "started"]
+__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "started"]
 
 _CLEAR = 8
 """Bins between a constant and a line: in the window's spectrum each is four wide on either side."""
@@ -59,19 +55,17 @@ _CLEAR = 8
 def fit(
     question: Question,
     seen: Imperfections,
-    led: Led | None = None,
     bent: Callable[[Course], OutputFit | None] | None = None,
 ) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual requires them.
 
     If plain dynamics with levels or with a drift leave white noise, richer ones are not tried: they
     would only imitate the effect. The same holds for a nonlinearity that `bent` finds, with a
-    single input. The levels found are returned with the fit. `led` is what `lead` found, if it is
-    known.
+    single input. The levels found are returned with the fit.
     """
     begun = _begin(question, seen)
     if begun is None:
-        return seen, _fit_and_look_for_rows(question, seen, led)
+        return seen, _fit_and_look_for_rows(question, seen)
     course = completed(begun)
     if not begun.best.is_white:
         levelled = _behind_levels(question, seen, begun, rests=course.counted.begins is None)
@@ -134,18 +128,14 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
         return None
 
     found = with_plain_drift(former.problem, former.best, begun, fitted)
-    if found is None or not found[0].related:
+    if found is None:
         return None
     joint, drifting = found
-    best = joint.best.fit  # richer dynamics may explain the slow part
-    tail = hidden_tail(joint.weighed, best, share=joint.weighed_share)
-    if follows(course.data, best) or tail is not None:
-        return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
 
 def _fit_and_look_for_rows(
-    question: Question, seen: Imperfections, begun: Course | Led | None = None
+    question: Question, seen: Imperfections, begun: Course | None = None
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
     software = question.intersample == "sampled"
@@ -155,7 +145,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
-    return _WithRows(question, seen, fitted, begun if isinstance(begun, Course) else None).found()
+    return _WithRows(question, seen, fitted).found()
 
 
 class _WithRows:
@@ -165,45 +155,32 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(
-        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
-    ) -> None:
+    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
         self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
         self.asked = fitted.leading if slow is None else slow
         self.latest = fitted  # with the rows that were tried last
-        self.freed: OutputFit | None = None
-        self.unrelated: dict[int, JointFit] = {}
-        self.begun = begun  # plain fits of a single input, at first without rows
+        self.begun: Course | None = None  # plain fits of a single input with rows
         self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
     def found(self) -> OutputFit:
         """The fit with hum and a drift, or without where it does not need them."""
-        joint, begun = self.first.fits[self.asked], self.begun
+        joint = self.first.fits[self.asked]
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
         if self.humming is None:  # as if it had not been tried
-            self.begun, self.between, self.latest = begun, [], self.first
+            self.latest = self.first
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
-        # Besides that asked, only inputs that the output follows are used to test for a drift.
-        others = ((i, fit) for i, fit in enumerate(steady.fits) if i != self.asked)
-        unrelated = {i: fit for i, fit in others if not fit.related}
-        self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
         joint, drifting = with_drift(before, self.with_rows, self.steadily)
-        if self.unrelated and drifting is not None:
-            self.unrelated = {}
-            joint, drifting = with_drift(before, self.with_rows, self.steadily)
         humming = self.humming
         if drifting is not None:
             steady = self.latest
             humming = None if humming is None else replace(humming, trend=self.hum)
-        elif self.freed is not None and joint is self.freed.fits[self.asked]:
-            steady = self.freed
         kept = replace(steady, drifting=drifting, humming=humming, asked=self.asked)
         if self.several:
             return replace(kept, fits=tuple(without_rows(one, slice(None)) for one in kept.fits))
@@ -211,12 +188,10 @@ class _WithRows:
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        question, before = self.question, self.latest
+        question = self.question
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = self._fitted(names, every)
-        if self.begun is not None and not plainly and before is not self.first:
-            self.latest = _as_before(question, self.begun, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -225,14 +200,14 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for as many rows."""
+        """Fit all inputs with rows; plain fits of a single input are made once for these."""
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             led = self.latest.led
-            return fit_once(question, seen, names, rows, begun=led, excluded=self.unrelated)
-        known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
-        if course is None or len(rows) != known:
-            course = started_with(question, seen, rows, course)
+            return fit_once(question, seen, names, rows, begun=led)
+        if course is None or not np.array_equal(course.problem.fixed()[1:], rows):
+            # What the rows explain may have led fits without them astray.
+            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
             self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
@@ -243,24 +218,8 @@ class _WithRows:
         if not self.several:
             return None
         hum = None if self.humming is None else self.humming.rows
-        self.freed = _all_free(self.question, self.latest, self.asked, hum)
-        return None if self.freed is None else self.freed.fits[self.asked]
-
-
-def _as_before(
-    question: Question, course: Course, before: OutputFit, found: OutputFit
-) -> OutputFit:
-    """The fit that a search with rows found, or the plainer dynamics found before if likelier.
-
-    A search may end in a large number of modes. The `course` has the plain fits with these rows.
-    """
-    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
-    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
-        return found
-    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
-    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
-    return OutputFit(fits=(joint,)) if gain > 0.0 else found
+        freed = _all_free(self.question, self.latest, self.asked, hum)
+        return None if freed is None else freed.fits[self.asked]
 
 
 def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
@@ -290,18 +249,11 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         return None if freed is None else freed.fits[asked]
 
     found = with_plain_drift(first.problem, first.best.fit, begun, fitted, steadily)
-    if found is None or not found[0].related:
+    if found is None:
         return None
     drifting = found[1]
     if drifting is None:
         return freed
-    steady = fit_once(question, seen, question.plain, begun=led)
-    former = steady.fits[asked]
-    if former.best.fit.is_white and steady.slow is None:
-        return None
-    count = plain.fits[asked].best.fit.nuisance.size
-    if criterion_gain(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
-        return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=drifting, asked=asked)
 
@@ -360,36 +312,9 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
     )
 
 
-def started_with(
-    question: Question, seen: Imperfections, rows: Real, known: Course | None
-) -> Course:
-    """Plain fits of one input with other rows than the `known` ones.
-
-    They continue from these if that leaves white noise. Otherwise what the rows explain may have
-    led the known fits astray, and they are started from the spectra.
-    """
-    if known is not None and known.data.noise is None:
-        course = resumed(known, replace(known.problem, nuisance=rows), known.fits)
-        if course.best.is_white:
-            return course
-    return completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-
-
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
-
-
-def lead(question: Question, seen: Imperfections) -> Led:
-    """Plain fit of the input that the output follows most, by its index."""
-    likeliest = partial(
-        fit_likeliest,
-        known=question.measured,
-        intersample=question.intersample,
-        structures=question.plain,
-    )
-    inputs, output = [source.values for source in question.aligned.inputs], question.output
-    return fit_leading(inputs, output.values, valid=counted_in(question, seen), likeliest=likeliest)
 
 
 def fit_once(
@@ -399,15 +324,13 @@ def fit_once(
     rows: Real | None = None,
     *,
     begun: Course | Led | None = None,
-    excluded: Mapping[int, JointFit] | None = None,
     fit_drift: Callable[[Led], OutputFit | None] | None = None,
     strong_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
     The search continues from `begun`, if it is known: the plain fits to a single input, or fits to
-    some of several. Inputs in `excluded` are not fitted; `fit_drift` and `strong_only` are
-    as for `fit_together`.
+    some of several; `fit_drift` and `strong_only` are as for `fit_together`.
     """
     if isinstance(begun, Course):
         return OutputFit(fits=(chosen_of(begun, structures),))
@@ -421,7 +344,6 @@ def fit_once(
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
-        excluded=excluded or {},
         led=begun,
         fit_drift=fit_drift,
         strong_only=strong_only,

@@ -3,20 +3,18 @@
 from dataclasses import replace
 from functools import partial
 
-from hmpim.identify.added_row import add_row, add_row_of_leading, fit_bent, fit_with_row
+from hmpim.identify.added_row import add_row, add_row_of_leading, fit_bent
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit, lead
+from hmpim.identify.fits import fit
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
-from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
-from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
+from hmpim.identify.nonlinear.speed import limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import WORTH
 from hmpim.record import Finding
 
 __all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends"]
@@ -28,14 +26,8 @@ def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, 
     With a single input, a nonlinearity is tried first only if it likely explains the residual of
     plain dynamics. The levels found are returned with the fit.
     """
-    if not _may_bend(question):
-        return fit(question, seen)
-    if len(question.aligned.inputs) == 1:
-        return fit(question, seen, bent=partial(fit_bent, question, seen))
-    led = lead(question, seen)
-    ((leading, joint),) = led.items()
-    bent = fit_with_row(question, seen, leading, joint)
-    return fit(question, seen, led) if bent is None else (seen, bent)
+    bent = partial(fit_bent, question, seen) if _may_bend(question) else None
+    return fit(question, seen, bent)
 
 
 def _may_bend(question: Question) -> bool:
@@ -72,17 +64,10 @@ def _limit_speed(
     limited = limited_command(source.values, joint)
     if limited is None:
         return question, fitted
-    noise = input_noise(source.values, aligned.fs, band=question.band(0))
-    if noise is not None and noise.attenuation > WORTH:
-        return question, fitted  # a speed limit smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
-    seen_then, again = fit(slower, seen)
+    _, again = fit(slower, seen)
     (other,) = again.fits
-    if seen_then is not seen:
-        return question, fitted  # levels were found: costs on different samples do not compare
-    if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
-        return question, fitted
     return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
 
 

@@ -22,7 +22,7 @@ __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pairs:
-    """The pairs of one output during the search; all but `y`, `valid`, `alike`, `excluded` change.
+    """The pairs of one output during the search; all but `y`, `valid` and `alike` change.
 
     `alike` is as for `fit_together`. A coupling that was strong keeps its assumption between the
     samples in `between`.
@@ -33,7 +33,6 @@ class Pairs:
     fits: dict[int, JointFit]
     strong: list[int]  # inputs that are no weak couplings, the strongest first
     alike: Sequence[tuple[frozenset[int], Mask]]
-    excluded: Mapping[int, JointFit]  # inputs to leave out
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
     between: dict[int, Intersample] = field(default_factory=dict)
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
@@ -157,7 +156,7 @@ class Pairs:
         for j in low:
             self.strong.remove(j)
             self.between[j] = self.fits[j].best.intersample
-        for j in [j for j in self.fits if low and j not in {*self.strong, *self.excluded}]:
+        for j in [j for j in self.fits if low and j not in self.strong]:
             del self.fits[j]
         return bool(low)
 

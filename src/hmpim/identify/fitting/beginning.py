@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Counted, Data, refit
+from hmpim.identify.fitting.data import Counted, Data
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
-from hmpim.identify.noise.whiteness import are_white, effective_share, is_white
+from hmpim.identify.noise.whiteness import are_white, effective_share
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.sampled import MARGIN, SampledInput
@@ -113,31 +113,17 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     valid = every & late
     innovations = problem.innovations(fit.prediction, fit.residual)
     count = int(np.count_nonzero(valid))
-    if count < _LEFT * fit.structure.parameters:
-        return None
     share = effective_share(innovations[valid])
     if _stands_out(innovations, every & ~late, valid):
         return begins
     if not fit.structure.order:
         return None
     part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
-    known = part if problem.begins is None else None
     counted = innovations if problem.counts is None else innovations * every
-    _, after = products(problem, fit, counted, *part.free, part=known, edges=(begins,))
+    _, after = products(problem, fit, counted, *part.free, part=part, edges=(begins,))
     moment, power = after[:-1, -1], float(after[-1, -1])
-    if power <= 0.0:
-        return None
     gained = float(moment @ solved(after[:-1, :-1], moment))
-    modes = len(part.free)
-    if needs_free(power, power - gained, share * count, modes):
-        return begins
-    if share == 1.0 or fit.objective != fit.cost:  # a whitened fit is not the best unwhitened one
-        return None
-    # The free response itself may colour the residual: only its own residual is noise.
-    free = refit(replace(problem, valid=valid, begins=begins), fit)
-    if free.objective <= 0.0:
-        return begins
-    needed = needs_free(power, free.objective, free.share * count, modes)
+    needed = needs_free(power, power - gained, share * count, len(part.free))
     return begins if needed else None
 
 
@@ -160,7 +146,7 @@ def needs_free(
 
 
 def look_again(
-    problem: Problem, trial: Trial, seen: Counted, *, lag: int, rests: bool, known: Mask | None
+    problem: Problem, trial: Trial, seen: Counted, *, lag: int, rests: bool
 ) -> Counted | None:
     """Samples that count, now that the structure is known; None if they do not change.
 
@@ -171,8 +157,7 @@ def look_again(
     begin at rest.
 
     `problem` is what the best `trial` was fitted to, over the samples `seen`, and `lag` is as for
-    `begins_of`. `rests` says whether this fit already showed that the record begins at rest, and
-    `known` which input samples were measured, all if None.
+    `begins_of`. `rests` says whether this fit already showed that the record begins at rest.
     """
     count = problem.y.size
     every = _counts(problem)
@@ -183,14 +168,8 @@ def look_again(
     if trial.intersample == "bandlimited":
         reach = ringing_of(problem.source)
         ends = ringing(count, trial.fit.delay, reach)
-        if problem.is_coloured and is_white(trial.fit.residual[every & ~ends]):
-            innovations = trial.fit.residual  # only the ends are coloured
         if _stands_out(innovations, every & ends, every & ~ends):
             return replace(seen, valid=~ends if seen.valid is None else seen.valid & ~ends)
-    if known is not None:
-        clear = _of_measured(trial.fit, every, known)
-        if clear is not every:
-            return replace(seen, valid=clear)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
     if rests:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
+from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
@@ -20,7 +20,7 @@ from hmpim.identify.fitting.candidates import (
 )
 from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
-from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem
+from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.second_zero import with_second_zero
@@ -45,7 +45,6 @@ __all__ = [
     "free_from_wander",
     "is_unanswered",
     "looks_held",
-    "resumed",
     "start",
     "turn_ahead",
 ]
@@ -170,8 +169,6 @@ def turn_ahead(course: Course) -> Course:
     counted[rough.earliest :] = False  # they answer input after the record
     shorter = replace(seen, valid=counted)
     count = np.count_nonzero(counted)
-    if count < PART * level.size:
-        return course
     problem, power = ahead.problem(course.natural, shorter), best.objective / course.problem.counted
     found = fit_plain(problem, rough, course.plain or PLAIN, largest=power * count)
     if TWICE * min(f.objective for f in found) > power * count:
@@ -199,9 +196,7 @@ def free_from_wander(course: Course) -> Course:
 def interpolate_finely(course: Course) -> Course:
     """Interpolate the input as finely as the noise makes worthwhile."""
     finer = interpolated_for(course, course.best)
-    if finer is None or course.natural != "bandlimited":
-        return finer or course
-    return replace(finer, fits=_again(finer, course.fits))
+    return course if finer is None else replace(finer, fits=_again(finer, course.fits))
 
 
 def interpolated_for(course: Course, fit: Fit) -> Course | None:
@@ -211,7 +206,7 @@ def interpolated_for(course: Course, fit: Fit) -> Course | None:
     by its own share over the root of the number of samples. The noise is taken from a median,
     which ignores samples that the ends of the record spoil.
     """
-    if course.alone and course.natural != "bandlimited":
+    if course.natural != "bandlimited":
         return None
     problem = course.data.problem("bandlimited", course.counted)
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
@@ -248,8 +243,7 @@ def find_beginning(course: Course) -> Course:
         counted = _in_motion(course) or counted
     if counted.begins is not None:  # fits that assumed rest may have ended anywhere
         problem = data.problem(natural, counted)
-        integrating = [refit(problem, fit) for fit in fits if fit.structure.integrators]
-        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits) + integrating
+        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits)
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:
@@ -273,11 +267,10 @@ def _in_motion(course: Course) -> Counted | None:
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
-def _again(course: Course, fits: list[Fit], *, precision: float = CONVERGED) -> list[Fit]:
+def _again(course: Course, fits: list[Fit]) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
-    again = refit_all(course.data, natural, course.counted, precision=precision)
-    return [fit for _, fit in again]
+    return [fit for _, fit in refit_all(course.data, natural, course.counted)]
 
 
 def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
@@ -295,27 +288,6 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
-
-
-def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
-    """Fit structures to other data of the same input, each from where its fit ended.
-
-    `problem` has the output, the rows and the samples that count. Unlike with `continued`, richer
-    structures may be tried later, and a noise model is kept.
-    """
-    y, lag = _level(problem.y, problem.nuisance, problem.valid), course.data.rough.lag
-    ahead = lag if lag < 0 else None
-    rough = rough_response(course.data.u, y, longest_delay=longest_lag(y.size), lag=ahead)
-    data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
-    seen = Counted(valid=problem.valid, begins=problem.begins)
-    course = replace(course, data=data, counted=seen, settled=None)
-    precision = CONVERGED / min(fits, key=lambda fit: fit.objective).share
-    course = replace(course, fits=_again(course, fits, precision=precision))
-    counted = _count_from_rest(course, course.best)
-    if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):
-        return course
-    course = replace(course, counted=counted)
-    return replace(course, fits=_again(course, course.fits, precision=precision))
 
 
 def _count_from_rest(course: Course, fit: Fit) -> Counted:
@@ -378,15 +350,15 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 
 
 def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
-    """Fits with one slow tail, two, and so on, while each is white or clearly likelier."""
+    """Fits with one slow tail, two, and so on, while each is clearly likelier."""
     data, problem, found = course.data, course.problem, list[Fit]()
     while data.keeps_samples:
         every = [*fits, *found]
         tailed = fit_with_tail(problem, every, course.others)
-        if tailed is None or any(fit.structure == tailed.structure for fit in found):
+        if tailed is None:
             break
         best = min(every, key=lambda fit: fit.objective)
-        if not (tailed.is_white or is_likelier(data, problem, tailed, best)):
+        if not is_likelier(data, problem, tailed, best):
             break
         found.append(tailed)
     return found

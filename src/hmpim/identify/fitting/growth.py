@@ -39,7 +39,6 @@ __all__ = [
     "hidden_pole",
     "one_more_pole",
     "response_to_square",
-    "samples_seen_by_pole",
     "scale_of",
     "with_pole",
 ]
@@ -222,25 +221,6 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     )
 
 
-def samples_seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
-    """Independent samples for the response of one more pole, as tested; None in white noise.
-
-    Colour elsewhere in the spectrum costs none. The noise is the residual of the `richer` fit,
-    since what the pole explains is not noise.
-    """
-    if hidden.halves is None:
-        return None
-    residual = problem.innovations(richer.prediction, richer.residual)
-    if is_white(problem.counting(residual)):
-        return None
-    freedom = max(problem.counted - hidden.shift.size - 1, 1)
-    own = combined(problem, hidden.fit, hidden.shift, response_to_square(problem, hidden.fit))
-    variance = float(covariance(own[None], residual, freedom=freedom, white=False)[0, 0])
-    power = max(float(own @ own), _TINY)
-    if_white = float(residual @ residual) / freedom / power
-    return float(problem.counted * if_white / max(variance, _TINY))
-
-
 def response_to_square(problem: Problem, fit: Fit) -> Real:
     """Derivative of the prediction with respect to q, shape (n,).
 
@@ -323,7 +303,7 @@ def grow(
     *,
     hidden: Callable[[F], HiddenPole],
     refit: Callable[[Structure, Real, float], F],
-    count: Callable[[HiddenPole, F], float],
+    count: float,
     names: tuple[StructureName, ...],
     white: Callable[[F], bool],
     otherwise: Callable[[F], float] = lambda _: np.inf,
@@ -339,8 +319,8 @@ def grow(
     refit : callable
         Fits a structure from a start; gives up if it cannot reach the objective that is its third
         argument.
-    count : callable
-        Independent samples for a tested pole, given the fit that has it.
+    count : float
+        Independent samples.
     names : tuple of str
         Structures that may be chosen; a fit of any other is a rival at most.
     white : callable
@@ -364,14 +344,13 @@ def grow(
             least = min((trial.fit.objective for trial in tried), default=np.inf)
             tried.append(refit(richer, with_pole(structure, best.fit.theta, lag), least))
         found = min(tried, key=lambda f: f.fit.objective)
-        samples = count(test, found)
-        gain = samples * float(np.log(best.fit.objective / found.fit.objective))
+        gain = count * float(np.log(best.fit.objective / found.fit.objective))
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
         sure = richer.order <= FEW_POLES or white(found)
-        gain = min(gain, samples * float(np.log(otherwise(best) / found.fit.objective)))
-        if gain < np.log(samples) or not may_be_chosen or not sure:
+        gain = min(gain, count * float(np.log(otherwise(best) / found.fit.objective)))
+        if gain < np.log(count) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
         grown.append(found)
         best = found

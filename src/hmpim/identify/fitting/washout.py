@@ -28,12 +28,11 @@ def washed_out(problem: Problem, fit: Fit) -> Fit | None:
     sections = one_more_pole(fit.structure).sections
     washouts = (known for known in STRUCTURES.values() if known.dc_zeros == known.zeros == 1)
     richer = next(washout for washout in washouts if washout.sections == sections)
-    best: Fit | None = None
+    found: list[Fit] = []
     for span in _SPANS:
         slow = span * problem.y.size
         theta = with_pole(fit.structure, fit.theta, slow)
         theta[0] += slow
-        hopeless = np.inf if best is None else TWICE * best.objective
-        found = fit_structure(problem, richer, theta, hopeless=hopeless)
-        best = found if best is None or found.objective < best.objective else best
-    return best
+        hopeless = TWICE * min((fit.objective for fit in found), default=np.inf)
+        found.append(fit_structure(problem, richer, theta, hopeless=hopeless))
+    return min(found, key=lambda fit: fit.objective)
