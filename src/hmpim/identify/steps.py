@@ -65,7 +65,11 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     prediction = fitted.prediction.copy()  # it is not valid before the free response
     prediction[: first.forgotten] = question.output.values[: first.forgotten]
     again = imperfections_of(question, prediction=prediction)
-    return replace(again, levels=seen.levels, quantization=seen.quantization)
+    again = replace(again, levels=seen.levels, quantization=seen.quantization)
+    plateau, before = again.saturation, seen.saturation
+    if plateau is None and before is not None and before.noise == "after":
+        return replace(again, saturation=before)
+    return again
 
 
 def _without_clusters(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:

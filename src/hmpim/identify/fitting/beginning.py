@@ -146,7 +146,7 @@ def needs_free(
 
 
 def look_again(
-    problem: Problem, trial: Trial, seen: Counted, *, lag: int, rests: bool
+    problem: Problem, trial: Trial, seen: Counted, *, lag: int, rests: bool, known: Mask | None
 ) -> Counted | None:
     """Samples that count, now that the structure is known; None if they do not change.
 
@@ -157,7 +157,8 @@ def look_again(
     begin at rest.
 
     `problem` is what the best `trial` was fitted to, over the samples `seen`, and `lag` is as for
-    `begins_of`. `rests` says whether this fit already showed that the record begins at rest.
+    `begins_of`. `rests` says whether this fit already showed that the record begins at rest, and
+    `known` which input samples were measured, all if None.
     """
     count = problem.y.size
     every = _counts(problem)
@@ -170,6 +171,10 @@ def look_again(
         ends = ringing(count, trial.fit.delay, reach)
         if _stands_out(innovations, every & ends, every & ~ends):
             return replace(seen, valid=~ends if seen.valid is None else seen.valid & ~ends)
+    if known is not None:
+        clear = _of_measured(trial.fit, every, known)
+        if clear is not every:
+            return replace(seen, valid=clear)
     if seen.begins is not None:
         return begin_later(seen, trial.fit)
     if rests:

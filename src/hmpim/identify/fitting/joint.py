@@ -34,8 +34,8 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import Fits, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
-from hmpim.identify.fitting.fit import fit_structure
-from hmpim.identify.fitting.growth import Growth, grow
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.growth import grow
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
@@ -187,9 +187,8 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
     """
     looked, trials, best, share = _looked_again(course, fitted)
     found = _fed_forward(looked, trials, _counting(looked, share))
-    if not found:
-        return looked, trials, best, share
-    best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
+    if found:
+        best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
     return looked, trials, best, share
 
 
@@ -200,7 +199,7 @@ def _looked_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Tr
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
         rests = best.fit is course.settled
-        again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests)
+        again = look_again(problem, best, seen, lag=data.rough.lag, rests=rests, known=course.known)
         bandlimited = best.intersample == "bandlimited"
         finer = interpolated_for(course, best.fit) if bandlimited else None
         if (again, finer) == (None, None):
@@ -217,10 +216,29 @@ def _looked_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Tr
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
     """Add poles that the likelihood supports, and record what it leaves open."""
-    growth = _grown_from(joint, joint.best, course, structures)
-    trials = (*joint.trials, *growth.grown)
-    joint = replace(joint, trials=trials, rivals=growth.rivals, hidden=growth.hidden)
-    return _with_leading(growth.grown[-1], joint, course) if growth.grown else joint
+    mode = joint.best.intersample
+    problem = course.data.problem(mode, course.counted)
+    count = problem.counted * joint.weighed_share
+
+    def otherwise(given: Fit) -> float:
+        most = given.structure.parameters
+        others = (t.fit for t in joint.trials if t.intersample != mode)
+        plain = [fit.objective for fit in others if fit.structure.parameters <= most]
+        return min(plain, default=np.inf)
+
+    growth = grow(
+        problem,
+        joint.best.fit,
+        hidden=course.data.hidden_pole,
+        count=count,
+        names=structures,
+        otherwise=otherwise,
+    )
+    grown, rivals = (
+        tuple(trial_of(mode, fit, count) for fit in fits) for fits in (growth.grown, growth.rivals)
+    )
+    joint = replace(joint, trials=(*joint.trials, *grown), rivals=rivals, hidden=growth.hidden)
+    return _with_leading(grown[-1], joint, course) if grown else joint
 
 
 def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
@@ -237,32 +255,6 @@ def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
     best = trial_of(mode, fit, count)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
-
-
-def _grown_from(
-    joint: JointFit, trial: Trial, course: Course, structures: tuple[StructureName, ...]
-) -> Growth[Trial]:
-    """Add poles to a trial."""
-    problem = course.data.problem(trial.intersample, course.counted)
-    count = problem.counted * joint.weighed_share
-
-    def otherwise(given: Trial) -> float:
-        most = given.fit.structure.parameters
-        others = (t.fit for t in joint.trials if t.intersample != given.intersample)
-        plain = [fit.objective for fit in others if fit.structure.parameters <= most]
-        return min(plain, default=np.inf)
-
-    return grow(
-        trial,
-        hidden=lambda tested: course.data.hidden_pole(problem, tested.fit),
-        refit=lambda structure, theta, hopeless: trial_of(
-            trial.intersample, fit_structure(problem, structure, theta, hopeless=hopeless), count
-        ),
-        count=count,
-        names=structures,
-        white=lambda found: found.fit.is_white,
-        otherwise=otherwise,
-    )
 
 
 def give_up(course: Course, fitted: Fits) -> JointFit:

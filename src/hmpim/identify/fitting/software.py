@@ -249,11 +249,34 @@ def _followed(
             most = _TASTE if fitted else 0
             fit = fit_structure(problem, structure, theta, iterations=most, hopeless=hopeless)
             fits.append(fit)
+    if not holding:
+        fits += [fit for structure in tried for fit in _walked(problem, structure, fits)]
     least = min(fit.cost for fit in fits)
     for i, fit in enumerate(fits):
         if fit.structure.order and fit.cost <= TWICE * least:
             fits[i] = polished(problem, fit)
     return fits
+
+
+def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:
+    """Move a structure's best delay earlier and later while the fit improves; the better fits.
+
+    With noise in past outputs, the equation error ranks delays differently from the output error.
+    """
+    own = [fit for fit in fits if fit.structure == structure]
+    known, found = {fit.delay for fit in own}, list[Fit]()
+    if not structure.order or not own:
+        return found
+    for step in (-1.0, 1.0):
+        best = min([*own, *found], key=lambda fit: fit.cost)
+        while 0.0 <= best.delay + step <= problem.longest_delay and best.delay + step not in known:
+            start = np.append(best.theta[0] + step, best.theta[1:])
+            other = fit_structure(problem, structure, start)
+            if not other.cost < best.cost:
+                break
+            best = other
+            found.append(other)
+    return found
 
 
 def _long_filter(
