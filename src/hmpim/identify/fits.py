@@ -22,6 +22,7 @@ from hmpim.identify.effects.imperfections import (
     find_imperfections,
     refine,
 )
+from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -98,6 +99,8 @@ def _behind_levels(
     if levels.noise == "after" and not behind.best.is_white:
         return None
     joint = chosen_of(behind, question.plain)
+    if levels.noise == "after" and not goes_beyond(levels, y, joint.best.fit.prediction):
+        return None
     if not joint.related:
         return None
     refined = refine(joint, clipped, question.aligned.inputs[0].values, question.aligned.fs)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, FALSE_ALARM, ONE_SIDED
 from hmpim.identify.effects.smeared import Side, corrections, smeared_plateaus
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TWICE
 
-__all__ = ["Saturation", "detect_saturation"]
+__all__ = ["Saturation", "detect_saturation", "goes_beyond"]
 
 
 _CROWDED = 3.5
@@ -179,6 +179,25 @@ def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
     if min(np.median(coming), np.median(leaving)) < 2.0:  # a jump, as of a square wave
         return False
     return bool(1.0 / TWICE < sum(coming) / sum(leaving) < TWICE)
+
+
+def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
+    """Whether a prediction, (n,), exceeds a clipping level of `y` that was found without it.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.arange(1000) / 50)
+    >>> y = np.clip(wave, -2.0, 0.8)
+    >>> found = detect_saturation(y)
+    >>> goes_beyond(found, y, wave), goes_beyond(found, y, y)
+    (True, False)
+    """
+    for side in found.sides:
+        sign = -1.0 if side is found.low else 1.0
+        ahead = _beyond(sign * y, sign * side.level, side.at, sign * prediction, 0.0)
+        if ahead is not None and _is_passed(*ahead, side.at, ROUNDING * float(np.ptp(y))):
+            return True
+    return False
 
 
 def _beyond(
