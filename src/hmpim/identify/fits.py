@@ -11,6 +11,7 @@ from hmpim.identify.coupling.output_fit import (
     Led,
     OutputFit,
     fit_in_motion,
+    fit_leading,
     fit_together,
     without_slow,
 )
@@ -35,7 +36,7 @@ from hmpim.identify.fitting.course import (
 )
 from hmpim.identify.fitting.data import Fits
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.joint import chosen_of
+from hmpim.identify.fitting.joint import chosen_of, fit_likeliest
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -46,7 +47,7 @@ from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
 
-__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "started"]
+__all__ = ["counted_in", "fit", "fit_once", "imperfections_of", "lead", "started"]
 
 _CLEAR = 8
 """Bins between a constant and a line: in the window's spectrum each is four wide on either side."""
@@ -55,17 +56,19 @@ _CLEAR = 8
 def fit(
     question: Question,
     seen: Imperfections,
+    led: Led | None = None,
     bent: Callable[[Course], OutputFit | None] | None = None,
 ) -> tuple[Imperfections, OutputFit]:
     """Fit every structure, with hum and a drift where the residual requires them.
 
     If plain dynamics with levels or with a drift leave white noise, richer ones are not tried: they
     would only imitate the effect. The same holds for a nonlinearity that `bent` finds, with a
-    single input. The levels found are returned with the fit.
+    single input. The levels found are returned with the fit. `led` is what `lead` found, if it is
+    known.
     """
     begun = _begin(question, seen)
     if begun is None:
-        return seen, _fit_and_look_for_rows(question, seen)
+        return seen, _fit_and_look_for_rows(question, seen, led)
     course = completed(begun)
     if not begun.best.is_white:
         levelled = _behind_levels(question, seen, begun, rests=course.counted.begins is None)
@@ -135,7 +138,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
 
 
 def _fit_and_look_for_rows(
-    question: Question, seen: Imperfections, begun: Course | None = None
+    question: Question, seen: Imperfections, begun: Course | Led | None = None
 ) -> OutputFit:
     """Fit every structure, and again with hum and a drift where the residual requires them."""
     software = question.intersample == "sampled"
@@ -315,6 +318,18 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
+
+
+def lead(question: Question, seen: Imperfections) -> Led:
+    """Plain fit of the input that the output follows most, by its index."""
+    likeliest = partial(
+        fit_likeliest,
+        known=question.measured,
+        intersample=question.intersample,
+        structures=question.plain,
+    )
+    inputs, output = [source.values for source in question.aligned.inputs], question.output
+    return fit_leading(inputs, output.values, valid=counted_in(question, seen), likeliest=likeliest)
 
 
 def fit_once(

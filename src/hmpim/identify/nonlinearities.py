@@ -3,10 +3,10 @@
 from dataclasses import replace
 from functools import partial
 
-from hmpim.identify.added_row import add_row, add_row_of_leading, fit_bent
+from hmpim.identify.added_row import add_row, add_row_of_leading, fit_bent, fit_with_row
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.imperfections import Imperfections
-from hmpim.identify.fits import fit
+from hmpim.identify.fits import fit, lead
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
@@ -26,8 +26,14 @@ def fit_output(question: Question, seen: Imperfections) -> tuple[Imperfections, 
     With a single input, a nonlinearity is tried first only if it likely explains the residual of
     plain dynamics. The levels found are returned with the fit.
     """
-    bent = partial(fit_bent, question, seen) if _may_bend(question) else None
-    return fit(question, seen, bent)
+    if not _may_bend(question):
+        return fit(question, seen)
+    if len(question.aligned.inputs) == 1:
+        return fit(question, seen, bent=partial(fit_bent, question, seen))
+    led = lead(question, seen)
+    ((leading, joint),) = led.items()
+    bent = fit_with_row(question, seen, leading, joint)
+    return fit(question, seen, led) if bent is None else (seen, bent)
 
 
 def _may_bend(question: Question) -> bool:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, every_of, median
+from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
 from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
@@ -20,7 +20,7 @@ from hmpim.identify.fitting.candidates import (
 )
 from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
-from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.second_zero import with_second_zero
@@ -45,6 +45,7 @@ __all__ = [
     "free_from_wander",
     "is_unanswered",
     "looks_held",
+    "resumed",
     "start",
     "turn_ahead",
 ]
@@ -267,10 +268,11 @@ def _in_motion(course: Course) -> Counted | None:
     return begun if TWICE * min(fit.objective for fit in free) < useless else None
 
 
-def _again(course: Course, fits: list[Fit]) -> list[Fit]:
+def _again(course: Course, fits: list[Fit], *, precision: float = CONVERGED) -> list[Fit]:
     """Fits to the samples that count now, from where they ended."""
     natural = [(course.natural, fit) for fit in fits]
-    return [fit for _, fit in refit_all(course.data, natural, course.counted)]
+    again = refit_all(course.data, natural, course.counted, precision=precision)
+    return [fit for _, fit in again]
 
 
 def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = None) -> Course:
@@ -288,6 +290,27 @@ def continued(course: Course, *, valid: Mask | None, nuisance: Real | None = Non
     course = replace(course, data=data, others=(), given=given, counted=given)
     course = replace(course, fits=_again(course, course.fits))
     return completed(course)
+
+
+def resumed(course: Course, problem: Problem, fits: list[Fit]) -> Course:
+    """Fit structures to other data of the same input, each from where its fit ended.
+
+    `problem` has the output, the rows and the samples that count. Unlike with `continued`, richer
+    structures may be tried later, and a noise model is kept.
+    """
+    y, lag = _level(problem.y, problem.nuisance, problem.valid), course.data.rough.lag
+    ahead = lag if lag < 0 else None
+    rough = rough_response(course.data.u, y, longest_delay=longest_lag(y.size), lag=ahead)
+    data = replace(course.data, y=problem.y, nuisance=problem.nuisance, rough=rough)
+    seen = Counted(valid=problem.valid, begins=problem.begins)
+    course = replace(course, data=data, counted=seen, settled=None)
+    precision = CONVERGED / min(fits, key=lambda fit: fit.objective).share
+    course = replace(course, fits=_again(course, fits, precision=precision))
+    counted = _count_from_rest(course, course.best)
+    if counted.begins == seen.begins and count_alike(counted.valid, seen.valid):
+        return course
+    course = replace(course, counted=counted)
+    return replace(course, fits=_again(course, course.fits, precision=precision))
 
 
 def _count_from_rest(course: Course, fit: Fit) -> Counted:

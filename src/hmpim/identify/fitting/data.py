@@ -158,7 +158,14 @@ def polished(problem: Problem, fit: Fit) -> Fit:
     return refit(problem, fit, precision=problem.final)
 
 
-def refit_all(data: Data, fitted: Fits, seen: Counted, *, hopeful: float = np.inf) -> Fits:
+def refit_all(
+    data: Data,
+    fitted: Fits,
+    seen: Counted,
+    *,
+    hopeful: float = np.inf,
+    precision: float = CONVERGED,
+) -> Fits:
     """Fit all structures to other data, from where they ended, the leading one first.
 
     A fit that promises a much larger residual than that one, or no smaller one than a plainer fit
@@ -176,6 +183,7 @@ def refit_all(data: Data, fitted: Fits, seen: Counted, *, hopeful: float = np.in
             fit.structure,
             fit.theta,
             iterations=RETURNS if fit.objective < hopeful else 0,
+            precision=precision,
             hopeless=hopeless_beside(fit.structure, list(done.values())),
         )
     return [(mode, done[i]) for i, (mode, _) in enumerate(fitted)]
