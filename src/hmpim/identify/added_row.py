@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 
 from hmpim.identify.arrays import Real, count_alike
-from hmpim.identify.chance import CLEARLY, DEVIATIONS, LIKELIER
+from hmpim.identify.chance import CLEARLY, LIKELIER
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
@@ -18,7 +18,6 @@ from hmpim.identify.fitting.course import Course, completed, resumed, turn_ahead
 from hmpim.identify.fitting.data import Counted, polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
-from hmpim.identify.fitting.growth import hidden_pole
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
@@ -89,15 +88,9 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
     if first.kind != "friction" and first.share < MOST and not first.white:
         return None
     joint = chosen_of(replace(course, others=()), question.plain, growing=False)
-    if not joint.related:
-        return None
     plainly = replace(question, structures=question.plain)
     fitted = add_row(plainly, seen, OutputFit(fits=(joint,), begun=course))
-    if fitted.bending is None:
-        return None
-    (bent,) = fitted.fits
-    missed = hidden_pole(bent.problem, bent.best.fit)
-    return fitted if abs(missed.squared) < DEVIATIONS * missed.std else None
+    return None if fitted.bending is None else fitted
 
 
 def fit_with_row(

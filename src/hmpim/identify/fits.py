@@ -1,6 +1,6 @@
 """Fit an output: all structures, and hum, a drift or levels where the residual requires them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,7 +23,6 @@ from hmpim.identify.effects.imperfections import (
     refine,
 )
 from hmpim.identify.effects.saturation import goes_beyond
-from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.course import (
     Course,
@@ -31,14 +30,12 @@ from hmpim.identify.fitting.course import (
     continue_between,
     continued,
     free_from_wander,
-    resumed,
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows
+from hmpim.identify.fitting.data import Fits
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
-from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -133,13 +130,9 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
         return None
 
     found = with_plain_drift(former.problem, former.best, begun, fitted)
-    if found is None or not found[0].related:
+    if found is None:
         return None
     joint, drifting = found
-    best = joint.best.fit  # richer dynamics may explain the slow part
-    tail = hidden_tail(joint.weighed, best, share=joint.weighed_share)
-    if follows(course.data, best) or tail is not None:
-        return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
 
@@ -154,7 +147,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
-    return _WithRows(question, seen, fitted, begun if isinstance(begun, Course) else None).found()
+    return _WithRows(question, seen, fitted).found()
 
 
 class _WithRows:
@@ -164,38 +157,28 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(
-        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
-    ) -> None:
+    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
         self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
         self.asked = fitted.leading if slow is None else slow
         self.latest = fitted  # with the rows that were tried last
-        self.unrelated: dict[int, JointFit] = {}
-        self.begun = begun  # plain fits of a single input, at first without rows
+        self.begun: Course | None = None  # plain fits of a single input with rows
         self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
     def found(self) -> OutputFit:
         """The fit with hum and a drift, or without where it does not need them."""
-        joint, begun = self.first.fits[self.asked], self.begun
+        joint = self.first.fits[self.asked]
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
         if self.humming is None:  # as if it had not been tried
-            self.begun, self.between, self.latest = begun, [], self.first
+            self.latest = self.first
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
-        # Besides that asked, only inputs that the output follows are used to test for a drift.
-        others = ((i, fit) for i, fit in enumerate(steady.fits) if i != self.asked)
-        unrelated = {i: fit for i, fit in others if not fit.related}
-        self.unrelated = unrelated if len(unrelated) < len(steady.fits) else {}
         joint, drifting = with_drift(before, self.with_rows)
-        if self.unrelated and drifting is not None:
-            self.unrelated = {}
-            joint, drifting = with_drift(before, self.with_rows)
         humming = self.humming
         if drifting is not None:
             steady = self.latest
@@ -207,12 +190,10 @@ class _WithRows:
 
     def with_rows(self, rows: Real, plainly: bool) -> JointFit:
         """Fit all inputs with rows, and with those of the hum found before."""
-        question, before = self.question, self.latest
+        question = self.question
         names = question.plain if plainly else question.structures
         every = rows if self.humming is None else np.vstack([rows, self.humming.rows])
         self.latest = self._fitted(names, every)
-        if self.begun is not None and not plainly and before is not self.first:
-            self.latest = _as_before(question, self.begun, before, self.latest)
         found = self.latest.fits[self.asked]
         if self.humming is None:
             return found
@@ -221,34 +202,19 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for as many rows."""
+        """Fit all inputs with rows; plain fits of a single input are made once for these."""
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             led = self.latest.led
-            return fit_once(question, seen, names, rows, begun=led, excluded=self.unrelated)
-        known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
-        if course is None or len(rows) != known:
-            course = started_with(question, seen, rows, course)
+            return fit_once(question, seen, names, rows, begun=led)
+        if course is None or not np.array_equal(course.problem.fixed()[1:], rows):
+            # What the rows explain may have led fits without them astray.
+            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
             self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
         return OutputFit(fits=(joint,))
 
-
-def _as_before(
-    question: Question, course: Course, before: OutputFit, found: OutputFit
-) -> OutputFit:
-    """The fit that a search with rows found, or the plainer dynamics found before if likelier.
-
-    A search may end in a large number of modes. The `course` has the plain fits with these rows.
-    """
-    (best,), (rich,) = ([one.best for one in fitted.fits] for fitted in (before, found))
-    if best.fit.structure.parameters >= rich.fit.structure.parameters or not best.fit.is_white:
-        return found
-    again = refit_between(course.problem, best.fit, best.intersample, course.natural)
-    joint = chosen_of(replace(course, fits=[*course.fits, again]), question.structures)
-    gain = criterion_gain(joint, 0, rich.fit, found.fits[0].problem)
-    return OutputFit(fits=(joint,)) if gain > 0.0 else found
 
 
 def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
@@ -331,21 +297,6 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
     )
 
 
-def started_with(
-    question: Question, seen: Imperfections, rows: Real, known: Course | None
-) -> Course:
-    """Plain fits of one input with other rows than the `known` ones.
-
-    They continue from these if that leaves white noise. Otherwise what the rows explain may have
-    led the known fits astray, and they are started from the spectra.
-    """
-    if known is not None and known.data.noise is None:
-        course = resumed(known, replace(known.problem, nuisance=rows), known.fits)
-        if course.best.is_white:
-            return course
-    return completed(free_from_wander(turn_ahead(started(question, seen, rows))))
-
-
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
     """Informative samples of the output, (n,); None if all are."""
     return seen.counting(np.asarray(question.output.valid), question.aligned.fs)
@@ -370,15 +321,13 @@ def fit_once(
     rows: Real | None = None,
     *,
     begun: Course | Led | None = None,
-    excluded: Mapping[int, JointFit] | None = None,
     fit_drift: Callable[[Led], OutputFit | None] | None = None,
     strong_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.
 
     The search continues from `begun`, if it is known: the plain fits to a single input, or fits to
-    some of several. Inputs in `excluded` are not fitted; `fit_drift` and `strong_only` are
-    as for `fit_together`.
+    some of several; `fit_drift` and `strong_only` are as for `fit_together`.
     """
     if isinstance(begun, Course):
         return OutputFit(fits=(chosen_of(begun, structures),))
@@ -392,7 +341,6 @@ def fit_once(
         structures=structures,
         alike=() if inputs is None else inputs.alike_bins(aligned.samples, aligned.fs),
         nuisance=rows,
-        excluded=excluded or {},
         led=begun,
         fit_drift=fit_drift,
         strong_only=strong_only,

@@ -11,12 +11,10 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
-from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
-from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
+from hmpim.identify.nonlinear.speed import limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
-from hmpim.identify.worth import WORTH
 from hmpim.record import Finding
 
 __all__ = ["fit_output", "looked_through", "model_nonlinearity", "possible_bends"]
@@ -72,17 +70,10 @@ def _limit_speed(
     limited = limited_command(source.values, joint)
     if limited is None:
         return question, fitted
-    noise = input_noise(source.values, aligned.fs, band=question.band(0))
-    if noise is not None and noise.attenuation > WORTH:
-        return question, fitted  # a speed limit smooths the noise of a measured command
     followed = replace(aligned, inputs=(replace(source, values=limited.values),))
     slower = replace(question, aligned=followed, limited=limited)
-    seen_then, again = fit(slower, seen)
+    _, again = fit(slower, seen)
     (other,) = again.fits
-    if seen_then is not seen:
-        return question, fitted  # levels were found: costs on different samples do not compare
-    if not explains_more(other.problem, other.best.fit, joint.problem, joint.best.fit):
-        return question, fitted
     return slower, replace(again, fits=(with_free_speed(other, limited.slope),))
 
 

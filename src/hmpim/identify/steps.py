@@ -11,7 +11,6 @@ from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.effects.lost_samples import stand_out
 from hmpim.identify.effects.quantization import is_predicted
-from hmpim.identify.effects.saturation import goes_beyond
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of, started
 from hmpim.identify.fitting.course import Course, continued, turn_ahead
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -67,15 +66,9 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     prediction[: first.forgotten] = question.output.values[: first.forgotten]
     again = imperfections_of(question, prediction=prediction)
     again = replace(again, levels=seen.levels, quantization=seen.quantization)
-    informative = again.informative(prediction.size, question.aligned.fs)
-    if informative is not None and np.ptp(question.output.values[informative]) == 0.0:
-        return seen  # all motion would be taken for spikes
     plateau, before = again.saturation, seen.saturation
     if plateau is None and before is not None and before.noise == "after":
-        kept = goes_beyond(before, question.output.values, prediction)  # else it settled there
-        return replace(again, saturation=before if kept else None)
-    if fitted.drifting is not None and plateau is not None and plateau.noise == "after":
-        return replace(again, saturation=None)  # a drift bends the output as a level does
+        return replace(again, saturation=before)
     return again
 
 

@@ -34,29 +34,6 @@ def test_what_rings_at_the_start_of_a_short_record_is_no_noise(seeds):
     assert np.mean(held) >= 0.8  # 0.95 on average
 
 
-def washed_out(seed: int, samples: int = 400) -> Problem:
-    """Noise behind a washout, 0.4 s; two samples before the record the input came down by 3."""
-    rng, size, fs = np.random.default_rng(seed), samples + 2000, 200.0
-    lines, at = np.fft.rfft(rng.standard_normal(size)), np.fft.rfftfreq(size, 1 / fs)
-    u = np.fft.irfft(np.where((at > 0) & (at <= 27.5), lines, 0.0), size)
-    u *= 3.0 / u.std()
-    u[: -samples - 2] += 3.0
-    unit = hmpim.Model(
-        delay=0.00784, scale_factor=1.0, bias=-0.34, numerator=(0.52, 0.0), denominator=(0.4, 1.0)
-    )
-    y = np.asarray(hmpim.simulate(unit, u, fs=fs, intersample="bandlimited"))[-samples:]
-    y = y + 0.03 * y.std() * rng.standard_normal(samples)
-    source = prepare_input(u[-samples:], "bandlimited")
-    return Problem(source=source, y=y, valid=None, longest_delay=100.0)
-
-
-def test_a_free_response_is_not_judged_by_the_colour_that_it_lends_the_residual():
-    problem = washed_out(5)
-    fit = fit_structure(problem, STRUCTURES["first_order_zero"], np.array([1.5, np.log(80.0)]))
-    assert fit.share < 0.02  # of 400 samples eight would be independent
-    assert begins_of(problem, fit, lag=2) == 6
-
-
 @pytest.mark.few(20)
 def test_coloured_noise_behind_an_input_from_rest_is_no_free_response(seeds):
     u = np.concatenate([np.zeros(50), np.random.default_rng(0).standard_normal(550)])

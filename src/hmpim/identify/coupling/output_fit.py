@@ -11,7 +11,7 @@ coupling. The error bars come from all pairs' derivatives together, so inputs th
 other widen them.
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -132,7 +132,6 @@ def fit_together(
     structures: tuple[StructureName, ...],
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
-    excluded: Mapping[int, JointFit],
     led: Led | None = None,
     fit_drift: Callable[[Led], OutputFit | None] | None = None,
     strong_only: bool = False,
@@ -143,7 +142,7 @@ def fit_together(
     `hmpim.identify.fitting.joint.joint_fit`; `known` is for all inputs together. `alike` names
     inputs that cannot be distinguished, and the bins where they cannot, (n // 2 + 1,): there, a
     coupling may be an error of the stronger input's model. `nuisance`, (k, n), are more rows that
-    enter linearly, such as a drift's. Inputs `excluded` are left out; each has its unrelated fit.
+    enter linearly, such as a drift's.
     The search starts from the fits `led` if given; they may have been made with other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
@@ -156,9 +155,9 @@ def fit_together(
         return OutputFit(fits=(fitted(inputs[0], y, valid=valid, structures=structures),))
     plain = tuple(name for name in structures if name in PLAIN) or structures
     plainly = partial(fitted, structures=plain, growing=False)
-    pairs = Pairs(y=y, valid=valid, fits={**excluded}, strong=[], alike=alike, excluded=excluded)
+    pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
     options = {"known": known, "intersample": intersample, "structures": plain}
-    begun = led or fit_leading(inputs, y, valid, excluded, nuisance=nuisance, **options)
+    begun = led or fit_leading(inputs, y, valid, nuisance=nuisance, **options)
     pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
@@ -238,7 +237,6 @@ def fit_leading(
     inputs: list[Real],
     y: Real,
     valid: Mask | None,
-    excluded: Collection[int] = (),
     **options: Any,
 ) -> Led:
     """Fit the input that an output, (n,), follows most; the others count as noise.
@@ -246,7 +244,7 @@ def fit_leading(
     The options are those of `hmpim.identify.fitting.joint.fit_likeliest`.
     """
     level = bridged(y, valid)
-    share = {j: _follows_at_all(u, level) for j, u in enumerate(inputs) if j not in excluded}
+    share = {j: _follows_at_all(u, level) for j, u in enumerate(inputs)}
     sums = {j: one for j in share if (one := _sum_in(inputs[j], level)) > share[j]}
     likely = {j: inputs[j] for j in (*_likely(share), *_likely(sums))}
     return dict([fit_likeliest(likely, y, valid=valid, **options)])
@@ -322,8 +320,8 @@ def _is_large(fit: JointFit) -> bool:
 
 
 def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
-    """Inputs that are neither strong nor excluded."""
-    return [j for j in range(len(inputs)) if j not in pairs.strong and j not in pairs.excluded]
+    """Inputs that are not strong."""
+    return [j for j in range(len(inputs)) if j not in pairs.strong]
 
 
 def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:

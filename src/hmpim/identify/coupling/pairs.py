@@ -21,7 +21,7 @@ __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pairs:
-    """The pairs of one output during the search; all but `y`, `valid`, `alike`, `excluded` change.
+    """The pairs of one output during the search; all but `y`, `valid` and `alike` change.
 
     `alike` is as for `fit_together`.
     """
@@ -31,7 +31,6 @@ class Pairs:
     fits: dict[int, JointFit]
     strong: list[int]  # inputs that are no weak couplings, the strongest first
     alike: Sequence[tuple[frozenset[int], Mask]]
-    excluded: Mapping[int, JointFit]  # inputs to leave out
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import FALSE_ALARM
-from hmpim.identify.fitting.data import Counted, Data, refit
+from hmpim.identify.fitting.data import Counted, Data
 from hmpim.identify.fitting.derivatives import products
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import Trial
-from hmpim.identify.noise.whiteness import are_white, effective_share, is_white
+from hmpim.identify.noise.whiteness import are_white, effective_share
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, PART, TWICE
 from hmpim.model.sampled import MARGIN, SampledInput
@@ -113,31 +113,17 @@ def begins_of(problem: Problem, fit: Fit, *, lag: int) -> int | None:
     valid = every & late
     innovations = problem.innovations(fit.prediction, fit.residual)
     count = int(np.count_nonzero(valid))
-    if count < _LEFT * fit.structure.parameters:
-        return None
     share = effective_share(innovations[valid])
     if _stands_out(innovations, every & ~late, valid):
         return begins
     if not fit.structure.order:
         return None
     part = part_of(replace(problem, begins=begins), fit.structure, fit.theta)
-    known = part if problem.begins is None else None
     counted = innovations if problem.counts is None else innovations * every
-    _, after = products(problem, fit, counted, *part.free, part=known, edges=(begins,))
+    _, after = products(problem, fit, counted, *part.free, part=part, edges=(begins,))
     moment, power = after[:-1, -1], float(after[-1, -1])
-    if power <= 0.0:
-        return None
     gained = float(moment @ solved(after[:-1, :-1], moment))
-    modes = len(part.free)
-    if needs_free(power, power - gained, share * count, modes):
-        return begins
-    if share == 1.0 or fit.objective != fit.cost:  # a whitened fit is not the best unwhitened one
-        return None
-    # The free response itself may colour the residual: only its own residual is noise.
-    free = refit(replace(problem, valid=valid, begins=begins), fit)
-    if free.objective <= 0.0:
-        return begins
-    needed = needs_free(power, free.objective, free.share * count, modes)
+    needed = needs_free(power, power - gained, share * count, len(part.free))
     return begins if needed else None
 
 
@@ -183,8 +169,6 @@ def look_again(
     if trial.intersample == "bandlimited":
         reach = ringing_of(problem.source)
         ends = ringing(count, trial.fit.delay, reach)
-        if problem.is_coloured and is_white(trial.fit.residual[every & ~ends]):
-            innovations = trial.fit.residual  # only the ends are coloured
         if _stands_out(innovations, every & ends, every & ~ends):
             return replace(seen, valid=~ends if seen.valid is None else seen.valid & ~ends)
     if known is not None:

@@ -12,9 +12,9 @@ from hmpim.identify.fitting.data import TASTE, Data, hopeless_beside, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
+    PLAIN,
     RICH,
     Proposal,
-    integrator_starts,
     members,
     proposals,
     with_fit,
@@ -228,12 +228,7 @@ def _climbed(
         best = min([best, *found], key=lambda fit: fit.objective)
         if explains(best):
             return found
-    for structure in rich:  # the rough response need not show the corner of a high pass
-        starts = _grown(structure, [best]) if structure.dc_zeros > 1 else []
-        if starts and structure not in {fit.structure for fit in found}:
-            found.append(best_of(problem, structure, starts, [best]))
-            best = min(best, found[-1], key=lambda fit: fit.objective)
-    if explains(best) or shared or best.structure.integrators:
+    if shared or best.structure.integrators:
         return found
     for p in proposals(with_fit(data.rough_left(best), best), rich, best)[:_AT_ONCE]:
         fit = climbed(p)
@@ -252,20 +247,19 @@ def fit_integrating(
     """Fits of the structures that integrate, the plainest first, until one leaves white noise.
 
     The search also stops at one that explains next to nothing, as of an output that does not
-    wander. Structures among `fits` are not fitted again.
+    wander.
     """
     found: list[Fit] = []
     for structure in members(structures, INTEGRATING):
         useless = bool(found) and found[-1].objective > NEARLY * problem.spread
         if useless or sums_to_noise([*fits, *found]):
             break
-        if any(fit.structure == structure for fit in fits):
-            continue
         if not found:
             running_sum = np.cumsum(data.u - data.u[0])
             rough = rough_response(running_sum, data.y, longest_delay=longest_lag(data.y.size))
         rivals = [*fits, *found]
-        starts = [*_grown(structure, rivals), *integrator_starts(rough, structure)]
+        rest = STRUCTURES[PLAIN[structure.order]]  # without the integrator
+        starts = [*_grown(structure, rivals), *starting_values(rough, rest)]
         found.append(best_of(problem, structure, starts, rivals))
     return found
 
@@ -447,12 +441,7 @@ def almost_integrates(fit: Fit) -> bool:
 
 def _misses_part(problem: Problem, fit: Fit, data: Data) -> bool:
     """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
-    span = slice(None)
-    if problem.valid is not None:
-        counted = np.flatnonzero(problem.valid)
-        span = slice(int(counted[0]), int(counted[-1]) + 1)
-        if counted.size < counted[-1] + 1 - counted[0]:
-            return False  # a spectrum needs samples without gaps
+    span = slice(None) if problem.valid is None else problem.valid
     missed = unexplained_response(
         data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=data.band
     )

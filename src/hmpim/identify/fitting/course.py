@@ -170,8 +170,6 @@ def turn_ahead(course: Course) -> Course:
     counted[rough.earliest :] = False  # they answer input after the record
     shorter = replace(seen, valid=counted)
     count = np.count_nonzero(counted)
-    if count < PART * level.size:
-        return course
     problem, power = ahead.problem(course.natural, shorter), best.objective / course.problem.counted
     found = fit_plain(problem, rough, course.plain or PLAIN, largest=power * count)
     if TWICE * min(f.objective for f in found) > power * count:
@@ -199,9 +197,7 @@ def free_from_wander(course: Course) -> Course:
 def interpolate_finely(course: Course) -> Course:
     """Interpolate the input as finely as the noise makes worthwhile."""
     finer = interpolated_for(course, course.best)
-    if finer is None or course.natural != "bandlimited":
-        return finer or course
-    return replace(finer, fits=_again(finer, course.fits))
+    return course if finer is None else replace(finer, fits=_again(finer, course.fits))
 
 
 def interpolated_for(course: Course, fit: Fit) -> Course | None:
@@ -211,7 +207,7 @@ def interpolated_for(course: Course, fit: Fit) -> Course | None:
     by its own share over the root of the number of samples. The noise is taken from a median,
     which ignores samples that the ends of the record spoil.
     """
-    if course.alone and course.natural != "bandlimited":
+    if course.natural != "bandlimited":
         return None
     problem = course.data.problem("bandlimited", course.counted)
     residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
@@ -248,8 +244,7 @@ def find_beginning(course: Course) -> Course:
         counted = _in_motion(course) or counted
     if counted.begins is not None:  # fits that assumed rest may have ended anywhere
         problem = data.problem(natural, counted)
-        integrating = [refit(problem, fit) for fit in fits if fit.structure.integrators]
-        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits) + integrating
+        fits = fit_plain(problem, data.rough, course.plain or PLAIN, before=fits)
         later = count_in(data, natural, fits, seen, course.known)
         counted = counted if later.begins is None else later
     if counted is seen:
@@ -378,15 +373,15 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 
 
 def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
-    """Fits with one slow tail, two, and so on, while each is white or clearly likelier."""
+    """Fits with one slow tail, two, and so on, while each is clearly likelier."""
     data, problem, found = course.data, course.problem, list[Fit]()
     while data.keeps_samples:
         every = [*fits, *found]
         tailed = fit_with_tail(problem, every, course.others)
-        if tailed is None or any(fit.structure == tailed.structure for fit in found):
+        if tailed is None:
             break
         best = min(every, key=lambda fit: fit.objective)
-        if not (tailed.is_white or is_likelier(data, problem, tailed, best)):
+        if not is_likelier(data, problem, tailed, best):
             break
         found.append(tailed)
     return found

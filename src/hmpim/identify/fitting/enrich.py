@@ -12,7 +12,7 @@ import numpy as np
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly, reweighted
-from hmpim.identify.fitting.start import RoughResponse, starting_values
+from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.worth import FEW, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
@@ -22,7 +22,6 @@ __all__ = [
     "PLAIN",
     "RICH",
     "Proposal",
-    "integrator_starts",
     "is_response",
     "members",
     "proposals",
@@ -58,19 +57,6 @@ INTEGRATING: tuple[StructureName, ...] = (
 
 _DELAYS = 7
 """Number of delays to start from, around that of the best fit so far."""
-
-
-def integrator_starts(rough: RoughResponse, structure: Structure) -> list[Real]:
-    """Starts for an integrator: those of its other poles, from the input's running sum.
-
-    Parameters
-    ----------
-    rough : RoughResponse
-        From the running sum of the input to the output.
-    structure : Structure
-        An integrator, alone or with other poles.
-    """
-    return starting_values(rough, STRUCTURES[PLAIN[structure.order]])  # one for each order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,12 +104,10 @@ def proposals(
             if len(starts) == 5:
                 break
             coefficients = _sections(denominators[i], structure)
-            if coefficients is not None:
-                theta = theta_of(structure, coefficients / rough.omega[-1] ** powers)
-                starts.append(np.append(delays[i], theta))
-        if starts:
-            found = fitted_roughly(rough, structure, np.stack(starts))
-            out.append(Proposal(structure=structure, starts=tuple(found.likely), error=found.error))
+            theta = theta_of(structure, coefficients / rough.omega[-1] ** powers)
+            starts.append(np.append(delays[i], theta))
+        found = fitted_roughly(rough, structure, np.stack(starts))
+        out.append(Proposal(structure=structure, starts=tuple(found.likely), error=found.error))
     if not all_of_them:
         out = [proposal for proposal in out if proposal.error < (1 - FEW) * _error(rough, fit)]
     least = min((proposal.error for proposal in out), default=0.0)
@@ -154,12 +138,10 @@ def without_fast(fit: Fit, structure: Structure) -> Real | None:
         if len(kept) + (1 if pole.imag == 0.0 else 2) <= structure.order and pole.imag >= 0.0:
             kept += [pole] if pole.imag == 0.0 else [pole, pole.conjugate()]
     denominator = np.real(np.polynomial.polynomial.polyfromroots(kept))
-    if len(kept) < structure.order or denominator[0] == 0.0 or any(p.imag for p in slow):
+    if len(kept) < structure.order:
         return None
     denominator = denominator / denominator[0]
     coefficients = _sections(denominator, structure)
-    if coefficients is None:
-        return None
     late = fit.delay + whole[1] + sum((1.0 / p).real for p in slow)
     late -= denominator[1] if kept else 0.0
     if structure.zeros == structure.dc_zeros:  # without zeros of its own: the fit's become delay
@@ -206,11 +188,9 @@ def _from_plain(rough: RoughResponse, structure: Structure, fit: Fit) -> Real:
     return np.array(theta)
 
 
-def _sections(denominator: Real, structure: Structure) -> Real | None:
+def _sections(denominator: Real, structure: Structure) -> Real:
     """Group the poles, mirrored into the left half plane, into the structure's sections."""
     poles = np.roots(denominator[::-1])
-    if poles.size < structure.order or np.any(np.abs(poles) < 1e-9):
-        return None
     poles = -np.abs(poles.real) + 1j * poles.imag
     pairs = sorted(poles[poles.imag > 1e-9], key=abs)
     real = sorted(poles[np.abs(poles.imag) <= 1e-9].real, key=abs)
@@ -222,12 +202,9 @@ def _sections(denominator: Real, structure: Structure) -> Real | None:
         elif order == 2:
             p, q = real.pop(0), real.pop(0)
             out += [-1 / p - 1 / q, 1 / (p * q)]
-        elif real:
+        else:
             out += [-1 / real.pop(0)]
-        else:  # two pairs do not make three poles
-            return None
-    values = np.array(out)
-    return np.maximum(values, 1e-4) if np.all(np.isfinite(values)) else None
+    return np.maximum(out, 1e-4)
 
 
 def members(

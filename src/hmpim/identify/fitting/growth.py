@@ -13,14 +13,13 @@ of its pole is a rival, which the intervals cover.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import DEVIATIONS, HALF, ONE_SIDED
 from hmpim.identify.fitting.derivatives import combined, products
-from hmpim.identify.fitting.fit import Fit, Problem, within_reach
+from hmpim.identify.fitting.fit import Fit, Problem, fit_structure, within_reach
 from hmpim.identify.fitting.least_squares import added
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.noise.covariance import covariance
@@ -39,7 +38,6 @@ __all__ = [
     "hidden_pole",
     "one_more_pole",
     "response_to_square",
-    "samples_seen_by_pole",
     "scale_of",
     "with_pole",
 ]
@@ -119,27 +117,16 @@ class HiddenPole:
         return chain and far
 
 
-class Fitted(Protocol):
-    """Anything that holds a fit."""
-
-    @property
-    def fit(self) -> Fit:
-        """The fit."""
-
-
-F = TypeVar("F", bound=Fitted)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Growth(Generic[F]):
+class Growth:
     """The result of adding poles.
 
     `grown` are fits that each beat the one before, the best last; `rivals` are fits with one more
     pole that lose only by its price; `hidden` is the test of the best fit for one more pole.
     """
 
-    grown: tuple[F, ...]
-    rivals: tuple[F, ...]
+    grown: tuple[Fit, ...]
+    rivals: tuple[Fit, ...]
     hidden: HiddenPole
 
 
@@ -222,25 +209,6 @@ def hidden_pole(problem: Problem, fit: Fit) -> HiddenPole:
     )
 
 
-def samples_seen_by_pole(problem: Problem, hidden: HiddenPole, richer: Fit) -> float | None:
-    """Independent samples for the response of one more pole, as tested; None in white noise.
-
-    Colour elsewhere in the spectrum costs none. The noise is the residual of the `richer` fit,
-    since what the pole explains is not noise.
-    """
-    if hidden.halves is None:
-        return None
-    residual = problem.innovations(richer.prediction, richer.residual)
-    if is_white(problem.counting(residual)):
-        return None
-    freedom = max(problem.counted - hidden.shift.size - 1, 1)
-    own = combined(problem, hidden.fit, hidden.shift, response_to_square(problem, hidden.fit))
-    variance = float(covariance(own[None], residual, freedom=freedom, white=False)[0, 0])
-    power = max(float(own @ own), _TINY)
-    if_white = float(residual @ residual) / freedom / power
-    return float(problem.counted * if_white / max(variance, _TINY))
-
-
 def response_to_square(problem: Problem, fit: Fit) -> Real:
     """Derivative of the prediction with respect to q, shape (n,).
 
@@ -319,59 +287,53 @@ def _moved(fit: Fit, change: Real, *, later: float = 0.0) -> tuple[Real, Real]:
 
 
 def grow(
-    best: F,
+    problem: Problem,
+    best: Fit,
     *,
-    hidden: Callable[[F], HiddenPole],
-    refit: Callable[[Structure, Real, float], F],
-    count: Callable[[HiddenPole, F], float],
+    hidden: Callable[[Problem, Fit], HiddenPole] = hidden_pole,
+    count: float,
     names: tuple[StructureName, ...],
-    white: Callable[[F], bool],
-    otherwise: Callable[[F], float] = lambda _: np.inf,
-) -> Growth[F]:
+    otherwise: Callable[[Fit], float] = lambda _: np.inf,
+) -> Growth:
     """Add poles to a fit while the likelihood supports them.
 
     Parameters
     ----------
-    best : Fitted
-        The chosen fit.
+    problem, best : Problem, Fit
+        The data, and the chosen fit to them.
     hidden : callable
-        Tests a fit for one more pole.
-    refit : callable
-        Fits a structure from a start; gives up if it cannot reach the objective that is its third
-        argument.
-    count : callable
-        Independent samples for a tested pole, given the fit that has it.
+        Tests a fit for one more pole, as `hidden_pole` does.
+    count : float
+        Independent samples.
     names : tuple of str
         Structures that may be chosen; a fit of any other is a rival at most.
-    white : callable
-        Whether a fit leaves white noise, which one with many poles must.
     otherwise : callable
         Least objective of fits no richer than a given one, under other assumptions between the
         samples: a fit with one more pole must improve on these too.
     """
-    grown: list[F] = []
+    grown: list[Fit] = []
     while True:
-        test = hidden(best)
-        structure = best.fit.structure
+        test = hidden(problem, best)
+        structure = best.structure
         if not test.is_significant or structure.order >= _MOST:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         richer = one_more_pole(structure)
         starts = [float(np.sqrt(test.squared))]
         if test.squared > DEVIATIONS * test.std:  # so far off q = 0 the estimate may be poor
             starts.append(_PROBE * test.scale)
-        tried: list[F] = []
+        tried: list[Fit] = []
         for lag in starts:
-            least = min((trial.fit.objective for trial in tried), default=np.inf)
-            tried.append(refit(richer, with_pole(structure, best.fit.theta, lag), least))
-        found = min(tried, key=lambda f: f.fit.objective)
-        samples = count(test, found)
-        gain = samples * float(np.log(best.fit.objective / found.fit.objective))
+            least = min((fit.objective for fit in tried), default=np.inf)
+            theta = with_pole(structure, best.theta, lag)
+            tried.append(fit_structure(problem, richer, theta, hopeless=least))
+        found = min(tried, key=lambda fit: fit.objective)
+        gain = count * float(np.log(best.objective / found.objective))
         if gain < ONE_SIDED**2:
             return Growth(grown=tuple(grown), rivals=(), hidden=test)
         may_be_chosen = richer.name != structure.name and richer.name in names
-        sure = richer.order <= FEW_POLES or white(found)
-        gain = min(gain, samples * float(np.log(otherwise(best) / found.fit.objective)))
-        if gain < np.log(samples) or not may_be_chosen or not sure:
+        sure = richer.order <= FEW_POLES or found.is_white
+        gain = min(gain, count * float(np.log(otherwise(best) / found.objective)))
+        if gain < np.log(count) or not may_be_chosen or not sure:
             return Growth(grown=tuple(grown), rivals=(found,), hidden=test)
         grown.append(found)
         best = found

@@ -19,7 +19,14 @@ from hmpim.identify.fitting.rows import Problem
 from hmpim.model.dynamics import Structure, coefficients_of, denominator_of
 from hmpim.model.sampled import SampledInput, companion
 
-__all__ = ["at_ends", "in_whole_samples", "is_all_behind_hold", "kept_in_sample", "steps_through"]
+__all__ = [
+    "at_ends",
+    "in_whole_samples",
+    "is_all_behind_hold",
+    "is_known_to_a_sample",
+    "kept_in_sample",
+    "steps_through",
+]
 
 _EDGE = 0.01
 """Least distance of the delay from the ends of its sample, in samples."""
@@ -53,6 +60,11 @@ def in_whole_samples(structure: Structure, *, held: bool) -> bool:
     short = structure.zeros - structure.dc_zeros + 1 < structure.order
     stepped = steps_through(structure, held=True) and not short
     return held and (structure.name == "static" or stepped)
+
+
+def is_known_to_a_sample(source: SampledInput, structure: Structure) -> bool:
+    """Whether samples of this input fix the delay of a structure to one sample and no closer."""
+    return in_whole_samples(structure, held=is_all_behind_hold(source, structure))
 
 
 def kept_in_sample(problem: Problem, structure: Structure, theta: Real) -> Problem:

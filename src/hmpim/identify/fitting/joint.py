@@ -31,23 +31,17 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows, polished, refit_all
+from hmpim.identify.fitting.data import Fits, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
-from hmpim.identify.fitting.fit import fit_structure
-from hmpim.identify.fitting.growth import (
-    Growth,
-    HiddenPole,
-    grow,
-    one_more_pole,
-    samples_seen_by_pole,
-)
+from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.growth import grow
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
 from hmpim.identify.fitting.whitening import weighed_by_noise
 from hmpim.identify.worth import TWICE
-from hmpim.model.dynamics import StructureName
+from hmpim.model.dynamics import Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["chosen_of", "fit_likeliest", "joint_fit"]
@@ -97,7 +91,7 @@ def joint_fit(
     JointFit
     """
     if intersample == "sampled":
-        return software_fit(u, y, valid=valid, structures=structures, nuisance=nuisance)
+        return software_fit(u, y, valid, structures, nuisance)
     course = start(u, y, valid, known, intersample, structures, nuisance, shared)
     course = turn_ahead(course)
     course = free_from_wander(course)
@@ -124,7 +118,7 @@ def fit_likeliest(
     found: dict[int, JointFit] = {}
     if intersample == "sampled":
         for j, u in inputs.items():
-            found[j] = software_fit(u, y, valid=valid, structures=structures, nuisance=nuisance)
+            found[j] = software_fit(u, y, valid, structures, nuisance)
         return _likeliest(found)
     courses = {
         j: turn_ahead(start(u, y, valid, known, intersample, structures, nuisance))
@@ -189,23 +183,18 @@ def weigh_and_look_again(course: Course, fitted: Fits) -> tuple[Course, list[Tri
     """Choose among all fits, and again where the best of them shows that other samples count.
 
     Zeros in front of the hold would explain ends of the record that do not count. So they are only
-    tried once these are left out; if they lead, which samples count is decided anew with them.
+    tried once these are left out.
     """
     looked, trials, best, share = _looked_again(course, fitted)
     found = _fed_forward(looked, trials, _counting(looked, share))
-    if not found:
-        return looked, trials, best, share
-    best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
-    if best.intersample == "feedforward" and looked.counted is not course.counted:
-        return _looked_again(course, fitted, fed_forward=True)
+    if found:
+        best, trials = _chosen(looked, [*trials, *found], _counting(looked, share))
     return looked, trials, best, share
 
 
-def _looked_again(
-    course: Course, fitted: Fits, *, fed_forward: bool = False
-) -> tuple[Course, list[Trial], Trial, float]:
+def _looked_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
     """Choose among all fits until the samples that count stay the same, or after two looks."""
-    course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
+    course, trials, best, share = _weigh(course, fitted)
     for _ in range(_LOOKS if course.data.keeps_samples else 0):
         data, seen = course.data, course.counted
         problem = data.problem(best.intersample, seen)
@@ -221,25 +210,35 @@ def _looked_again(
         others = [(mode, fit) for mode, fit in fitted if (mode, fit.structure) != chosen]
         others = [(m, f) for m, f in others if f.cost < most or f.structure.name in PLAIN]
         fitted = refit_all(course.data, [(best.intersample, best.fit), *others], again)
-        course, trials, best, share = _weigh(course, fitted, fed_forward=fed_forward)
+        course, trials, best, share = _weigh(course, fitted)
     return course, trials, best, share
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
-    """Add poles that the likelihood supports, and record what it leaves open.
+    """Add poles that the likelihood supports, and record what it leaves open."""
+    mode = joint.best.intersample
+    problem = course.data.problem(mode, course.counted)
+    count = problem.counted * joint.weighed_share
 
-    Half a sample of delay, or a zero, may have replaced a missing pole: so poles are also added to
-    the likeliest natural trials without zeros and with them, and the likeliest result leads.
-    """
-    growth = _grown_from(joint, joint.best, course, structures)
-    leading, found = (joint.best, *growth.grown)[-1], [*joint.trials, *growth.grown]
-    for rival in _others_to_grow(joint, course.natural):
-        other = _grown_from(joint, rival, course, structures)
-        found += other.grown
-        if other.grown and other.grown[-1].criterion < leading.criterion:
-            growth, leading = other, other.grown[-1]
-    joint = replace(joint, trials=tuple(found), rivals=growth.rivals, hidden=growth.hidden)
-    return joint if leading is joint.best else _with_leading(leading, joint, course)
+    def otherwise(given: Fit) -> float:
+        most = given.structure.parameters
+        others = (t.fit for t in joint.trials if t.intersample != mode)
+        plain = [fit.objective for fit in others if fit.structure.parameters <= most]
+        return min(plain, default=np.inf)
+
+    growth = grow(
+        problem,
+        joint.best.fit,
+        hidden=course.data.hidden_pole,
+        count=count,
+        names=structures,
+        otherwise=otherwise,
+    )
+    grown, rivals = (
+        tuple(trial_of(mode, fit, count) for fit in fits) for fits in (growth.grown, growth.rivals)
+    )
+    joint = replace(joint, trials=(*joint.trials, *grown), rivals=rivals, hidden=growth.hidden)
+    return _with_leading(grown[-1], joint, course) if grown else joint
 
 
 def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
@@ -249,67 +248,13 @@ def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
     count = problem.counted * joint.weighed_share
     fit = polished(problem, leading.fit)
     trials = [trial for trial in joint.trials if trial is not leading]
-    others = () if course.alone else BETWEEN
-    if _tries_feedforward(course) and may_be_fed_forward(fit.structure):
-        others = (*others, "feedforward")
-    for other in others:
+    for other in () if course.alone else BETWEEN:
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
             trials.append(trial_of(other, moved, count))
     best = trial_of(mode, fit, count)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
-
-
-def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
-    """The likeliest natural trials without zeros and with them, except the best itself.
-
-    If the best has zeros, instead of it the one with a pole fewer: a fit with zeros from its own
-    start may have ended elsewhere.
-    """
-    own, most = joint.best.fit.structure, TWICE * joint.best.fit.objective
-    hopeful = [t for t in joint.trials if t.intersample == natural and t.fit.objective < most]
-    hopeful = [t for t in hopeful if t.fit.structure.integrators == own.integrators]
-    found = []
-    for with_zeros in (False, True):
-        alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
-        if joint.best in alike:
-            alike = [t for t in alike if with_zeros and one_more_pole(t.fit.structure) == own]
-        if alike:
-            found.append(min(alike, key=lambda trial: trial.criterion))
-    return found
-
-
-def _grown_from(
-    joint: JointFit, trial: Trial, course: Course, structures: tuple[StructureName, ...]
-) -> Growth[Trial]:
-    """Add poles to a trial."""
-    problem = course.data.problem(trial.intersample, course.counted)
-    count = problem.counted * joint.weighed_share
-
-    def samples(test: HiddenPole, richer: Trial) -> float:
-        # A residual that follows the input is no noise, and its spectrum counts no samples.
-        if follows(course.data, richer.fit):
-            return count
-        return samples_seen_by_pole(problem, test, richer.fit) or count
-
-    def otherwise(given: Trial) -> float:
-        most = given.fit.structure.parameters
-        others = (t.fit for t in joint.trials if t.intersample != given.intersample)
-        plain = [fit.objective for fit in others if fit.structure.parameters <= most]
-        return min(plain, default=np.inf)
-
-    return grow(
-        trial,
-        hidden=lambda tested: course.data.hidden_pole(problem, tested.fit),
-        refit=lambda structure, theta, hopeless: trial_of(
-            trial.intersample, fit_structure(problem, structure, theta, hopeless=hopeless), count
-        ),
-        count=samples,
-        names=structures,
-        white=lambda found: found.fit.is_white,
-        otherwise=otherwise,
-    )
 
 
 def give_up(course: Course, fitted: Fits) -> JointFit:
@@ -319,9 +264,7 @@ def give_up(course: Course, fitted: Fits) -> JointFit:
     return settle(course, trials, likeliest_of(trials, course.natural), share, silent=True)
 
 
-def _weigh(
-    course: Course, fitted: Fits, *, fed_forward: bool
-) -> tuple[Course, list[Trial], Trial, float]:
+def _weigh(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Trial, float]:
     """Compare all fits under one noise model, and polish the best.
 
     Return the course with that model, all trials, the best trial, and the effective share.
@@ -335,8 +278,6 @@ def _weigh(
         fitted = refit_all(weighed, fitted, seen, hopeful=TWICE * leading.objective)
     count = _counting(course, share)
     trials = [trial_of(mode, fit, count) for mode, fit in fitted]
-    if fed_forward:
-        trials += _fed_forward(course, trials, count)
     best, trials = _chosen(course, trials, count)
     return course, trials, best, share
 
@@ -367,7 +308,7 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
     if not _tries_feedforward(course) or leading.dc_zeros:
         return []
     most = np.inf if leading.zeros else leading.parameters
-    known = {trial.fit.structure for trial in trials if trial.intersample == "feedforward"}
+    known: set[Structure] = set()
     found: list[Trial] = []
     for trial in sorted(trials, key=lambda trial: trial.fit.objective):
         structure, mode = trial.fit.structure, trial.intersample

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Complex, Real
-from hmpim.identify.fitting.data import Data, refit
+from hmpim.identify.fitting.data import Data
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly, residual_of
 from hmpim.identify.fitting.start import RoughResponse, local_minima
@@ -78,8 +78,6 @@ def grown_modes(
         best = min(found.values(), key=lambda f: f.objective, default=None)
         if best is None or best.objective > TWICE * hopeless:
             break
-        if not best.converged:
-            best = found[best.structure] = refit(problem, best)
         if best.is_white:
             return [*found.values(), *_with_fewer(problem, rough, best, structures)]
         delay = best.delay

@@ -33,12 +33,7 @@ def plainer(joint: JointFit) -> Fit | None:
 
 
 def taking(joint: JointFit, fit: Fit) -> JointFit:
-    """Replace the chosen fit by another one to the same data, of a structure that was tried.
-
-    Nothing changes if it is the chosen one.
-    """
-    if fit is joint.best.fit:
-        return joint
+    """Replace the chosen fit by another one to the same data, of a structure that was tried."""
     mode, name = joint.best.intersample, fit.structure.name
     best = trial_of(mode, fit, joint.problem.counted * joint.effective_share)
     others = [t for t in joint.trials if (t.fit.structure.name, t.intersample) != (name, mode)]

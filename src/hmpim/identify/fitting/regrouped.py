@@ -44,10 +44,8 @@ def regrouped(structure: Structure, theta: Real) -> Real | None:
     if distance > PART:
         return None
     into, out = sorted((first.section, second.section), key=lambda k: -structure.sections[k])
-    free = [pole.lag for pole in real if pole.section in (into, out)]
-    free = [lag for lag in free if lag not in (first.lag, second.lag)]
-    if len(free) != structure.sections[out] or structure.sections[into] != 2:
-        return None
+    others = [pole for pole in real if pole is not first and pole is not second]
+    free = [pole.lag for pole in others if pole.section in (into, out)]
     coefficients[into] = [first.lag + second.lag, first.lag * second.lag]
     coefficients[out] = [sum(free), float(np.prod(free))][: len(free)]
     return np.append(theta[0], theta_of(structure, np.concatenate(coefficients)))

@@ -166,7 +166,7 @@ def is_exact(u: Real, y: Real) -> bool:
         equations = _equations(u, y, None, most=most)
         allowed = ROUNDING**2 * float(y.var()) * equations.rows
         least = equations.factor[-1, -1] ** 2  # the cost, if no direction is left out
-        if not least < allowed or not equations.cost_of_all < allowed:
+        if not least < allowed:
             return False
     if any(equations.holds(structure, allowed) for structure in FILTERS.values()):
         return True
@@ -175,43 +175,34 @@ def is_exact(u: Real, y: Real) -> bool:
     return every.predictability() >= ROUNDING and cost <= allowed * every.rows / equations.rows
 
 
+@kept
 def software_fit(
     u: Real,
     y: Real,
-    *,
     valid: Mask | None = None,
     structures: tuple[str, ...] = tuple(FILTERS),
     nuisance: Real | None = None,
 ) -> JointFit:
     """Fit every filter at every possible delay, and keep the one that the record supports.
 
-    Those of the `structures` that are filters are tried, all of `FILTERS` if there are none; the
-    rest is as for `hmpim.identify.fitting.joint.joint_fit`. There is a trial for each structure and
-    delay that was fitted.
+    The `structures` are names of `FILTERS`; the rest is as for
+    `hmpim.identify.fitting.joint.joint_fit`. There is a trial for each structure and delay that was
+    fitted.
     """
-    names = tuple(name for name in structures if name in FILTERS) or tuple(FILTERS)
-    return _software_fit(u, y, None if valid is None or valid.all() else valid, names, nuisance)
-
-
-@kept
-def _software_fit(
-    u: Real, y: Real, valid: Mask | None, names: tuple[str, ...], nuisance: Real | None
-) -> JointFit:
-    """The same, kept: an earlier question may already have made this fit."""
     equations = _equations(u, y, valid)
     source, latest = prepare_input(u, "sampled"), u.size // 2
     problem = Problem(source=source, y=y, valid=valid, longest_delay=latest, nuisance=nuisance)
     floor = _ROUNDING**2 * problem.spread
-    fits = _followed(problem, equations, u, names, exact=floor)
+    fits = _followed(problem, equations, u, structures, exact=floor)
     first = min(fits, key=lambda fit: fit.cost)
     if first.cost > floor and equations.cost_of_all <= floor:
         # The filters are exact but for input before the record.
         problem = _begun_at(problem, _unknown(u, equations.first + equations.count))
-        fits = _followed(problem, equations, u, names, exact=floor)
+        fits = _followed(problem, equations, u, structures, exact=floor)
     elif first.cost > floor and (begins := begins_of(problem, first, lag=0)) is not None:
         problem = _begun_at(problem, begins)
         fits = [refit(problem, fit) for fit in fits]
-    if "fir_16" in names and min(fit.cost for fit in fits) > floor:
+    if "fir_16" in structures and min(fit.cost for fit in fits) > floor:
         problem, fits = _long_filter(problem, equations, u, exact=floor) or (problem, fits)
     share = effective_share(min(fits, key=lambda fit: fit.cost).residual)
     count = problem.counted * share

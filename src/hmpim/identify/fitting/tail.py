@@ -53,8 +53,8 @@ def hidden_tail(problem: Problem, fit: Fit, *, share: float = 1.0) -> Tail | Non
     share : float
         Independent samples per sample.
     """
-    excluded = fit.structure.integrators or fit.structure.dc_zeros or fit.structure.sampled
-    if excluded or fit.initial.size or fit.objective <= 0.0 or not _lags(fit).size:
+    excluded = fit.structure.integrators or fit.structure.dc_zeros
+    if excluded or fit.initial.size or not _lags(fit).size:
         return None
     lags, gains, sizes = _scores(problem, fit)
     k = int(np.argmax(gains))
@@ -82,8 +82,7 @@ def fit_with_tail(
     tail = None if richer is None else hidden_tail(problem, best)
     if richer is None or tail is None:
         return None
-    same = [fit.theta for fit in fits if fit.structure == richer]
-    return best_of(problem, richer, [_start(best, tail.lag), *same], fits)
+    return best_of(problem, richer, [_start(best, tail.lag)], fits)
 
 
 def with_tail(

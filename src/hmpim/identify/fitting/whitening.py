@@ -32,9 +32,6 @@ def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted
     if noise.size == 1:
         return None
     whitened = problem.coloured(noise)
-    innovations = whitened.innovations(fit.prediction, fit.residual)
-    if float(innovations @ innovations) > PART * fit.cost:
-        return None
     u, y = (scipy.signal.lfilter(noise, np.ones(1), x - x.mean()) for x in (data.u, data.y))
     y = y if seen.valid is None else y * whitened.past_known
     rough = rough_response(u[noise.size :], y[noise.size :], longest_delay=longest_lag(data.u.size))

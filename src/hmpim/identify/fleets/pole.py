@@ -8,14 +8,14 @@ from dataclasses import replace
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.fit import fit_structure
-from hmpim.identify.fitting.growth import grow, hidden_pole
+from hmpim.identify.fitting.growth import grow
 from hmpim.identify.fitting.rows import Problem
-from hmpim.identify.fitting.trial import JointFit, Trial, trial_of
+from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fleets.learnt import Fleet, Member, theta_at
 from hmpim.identify.reading.spanned import spanned
 from hmpim.identify.result import Parameters
 from hmpim.identify.signals import longest_lag
-from hmpim.model.dynamics import STRUCTURES, Structure
+from hmpim.model.dynamics import STRUCTURES
 
 __all__ = ["alone_of", "with_tails"]
 
@@ -31,24 +31,12 @@ def with_tails(
     except for its price.
     """
     joint = alone_of(fleet, member, place, y)
-    problem = joint.problem
-
-    def refit(structure: Structure, theta: Real, hopeless: float) -> Trial:
-        fit = fit_structure(problem, structure, theta, hopeless=hopeless)
-        return trial_of(member.intersample, fit, y.size)
-
-    growth = grow(
-        joint.best,
-        hidden=lambda trial: hidden_pole(problem, trial.fit),
-        refit=refit,
-        count=lambda *_: float(y.size),
-        names=tuple(STRUCTURES),
-        white=lambda trial: trial.fit.is_white,
-    )
+    growth = grow(joint.problem, joint.best.fit, count=float(y.size), names=tuple(STRUCTURES))
     if growth.grown:
         return None
-    joint = replace(joint, rivals=growth.rivals, hidden=growth.hidden)
-    delay = growth.rivals[0].fit.delay / fleet.fs if growth.rivals else None
+    rivals = tuple(trial_of(member.intersample, fit, y.size) for fit in growth.rivals)
+    joint = replace(joint, rivals=rivals, hidden=growth.hidden)
+    delay = rivals[0].fit.delay / fleet.fs if rivals else None
     return spanned(own, joint, fs=fleet.fs, highest=fleet.highest), delay
 
 

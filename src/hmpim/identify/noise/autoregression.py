@@ -40,7 +40,6 @@ _SLOPES = (0.5, 1.0, 1.5)
 """Powers of 1/f between white noise and a random walk, which are autoregressions themselves."""
 
 _INNOVATION_ORDER = 12
-_MOST_INNOVATIONS = 100_000
 
 
 def autoregression(residual: Real, valid: Mask | None) -> Real:
@@ -123,14 +122,9 @@ def innovation_gain(y: Real, residual: Real) -> float:
     >>> innovation_gain(wander + 2 * pulses, wander) > 500
     True
     """
-    if y.size > _MOST_INNOVATIONS:
-        middle = slice((y.size - _MOST_INNOVATIONS) // 2, (y.size + _MOST_INNOVATIONS) // 2)
-        y, residual = y[middle], residual[middle]
-    before, after = _innovation_power(y), _innovation_power(residual)
-    if after <= 0.0:
-        return float("inf") if before > 0.0 else 0.0
-    size = y.size - _INNOVATION_ORDER
-    return float(0.5 * size * np.log(max(before / after, np.finfo(float).tiny)))
+    tiny = float(np.finfo(float).tiny)
+    before, after = (max(_innovation_power(x), tiny) for x in (y, residual))
+    return float(0.5 * (y.size - _INNOVATION_ORDER) * np.log(before / after))
 
 
 def _innovation_power(x: Real) -> float:

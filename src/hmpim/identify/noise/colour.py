@@ -59,11 +59,11 @@ def noise_colour(residual: Real, fs: float) -> NoiseColour:
     if line is not None:
         e = e - tone_of(e, line / fs)
     r = autocovariance(e, 1)
-    rho = 0.0 if r[0] == 0 else float(r[1] / r[0])
+    rho = float(r[1] / r[0])
     rho = float(np.clip(rho + (1 + 3 * rho) / n, -0.9999, 0.9999))  # Kendall's bias
     kind: Colour = "white"
     exponent = 0.0
-    if r[0] > 0 and not is_white(e):
+    if not is_white(e):
         kind, exponent = _likelier(e)
     return NoiseColour(kind=kind, coefficient=rho, exponent=exponent, line_frequency=line)
 

@@ -140,7 +140,7 @@ def effective_share(residual: Real) -> float:
     significant correlation.
     """
     lags = min(200, residual.size // 4)
-    if is_white(residual) or lags < 1:
+    if is_white(residual):
         return 1.0
     r = autocovariance(residual, lags)
     return share_of(r[1:] / r[0], int(np.count_nonzero(residual)))

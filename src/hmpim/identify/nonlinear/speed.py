@@ -30,7 +30,7 @@ from hmpim.model.operators import rate_limited
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Finding, Intersample
 
-__all__ = ["LimitedCommand", "explains_more", "limited_command", "speed_finding", "with_free_speed"]
+__all__ = ["LimitedCommand", "limited_command", "speed_finding", "with_free_speed"]
 
 _STEP = 0.01
 """Step in the speed for its curvature, over the greatest speed of the command."""
@@ -87,7 +87,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     if other.fit(speed, least).cost < TWICE * least.cost:
         both = [each for each in (found, _profiled(u, other, speed, least)) if each]
         found = min(both, key=lambda each: each[1].cost, default=None)
-    if found is None or not explains_more(problem, found[1], problem, linear):
+    if found is None or _log_odds(problem, found[1], linear) <= CLEARLY:
         return None
     limited, fit = found
     plainly = linear
@@ -100,18 +100,14 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     return limited
 
 
-def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
-    """Whether a fit with a limited speed is likelier than the best linear one by 400 to 1.
+def _log_odds(problem: Problem, fit: Fit, best: Fit) -> float:
+    """Log-odds of a fit with a limited speed to the best linear one.
 
-    Each fit has its own data. Both are in autoregressive noise; the limit counts as a parameter.
+    Both are in autoregressive noise; the limit counts as a parameter.
     """
-    return _log_odds(limited, fit, linear, best) > CLEARLY
-
-
-def _log_odds(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> float:
-    count = limited.counted
-    with_limit = yule_walker(limited.masked(fit.residual), LONGEST_AUTOREGRESSION)[1]
-    without = yule_walker(linear.masked(best.residual), LONGEST_AUTOREGRESSION)[1]
+    count = problem.counted
+    with_limit = yule_walker(problem.masked(fit.residual), LONGEST_AUTOREGRESSION)[1]
+    without = yule_walker(problem.masked(best.residual), LONGEST_AUTOREGRESSION)[1]
     if with_limit <= 0.0 or without <= 0.0:
         return -np.inf
     extra = fit.structure.parameters + 1 - best.structure.parameters
@@ -192,7 +188,7 @@ def _nearest(command: _Followed, best: Fit) -> tuple[float, Fit] | None:
     problem = command.at(speed)
     free = problem.with_row(command.slope(speed, least))
     fits = (least, fit_structure(free, least.structure, least.theta))
-    if max(_log_odds(problem, fit, command.problem, best) for fit in fits) <= 0.0:
+    if max(_log_odds(problem, fit, best) for fit in fits) <= 0.0:
         return None
     return speed, least
 

@@ -11,7 +11,7 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.joint import joint_fit
-from hmpim.identify.fitting.software import is_exact, software_fit
+from hmpim.identify.fitting.software import is_exact
 from hmpim.identify.nonlinear.speed import LimitedCommand
 from hmpim.identify.preparation.reference import Instrument
 from hmpim.identify.result import InputSet
@@ -105,7 +105,8 @@ def recognise_software(question: Question) -> Question:
     u, y = source.values, output.values
     if not is_exact(u, y):
         return question
-    filters = software_fit(u, y).best.fit
+    names = cast(tuple[StructureName, ...], tuple(FILTERS))
+    filters = joint_fit(u, y, intersample="sampled", structures=names).best.fit
     enough = ROUNDING**2 * float(np.sum((y - y.mean()) ** 2))
     if filters.cost > enough:
         return question
@@ -116,5 +117,4 @@ def recognise_software(question: Question) -> Question:
         for trial in joint_fit(u, y, structures=plainer).trials
     ):
         return question
-    names = cast(tuple[StructureName, ...], tuple(FILTERS))
     return replace(question, intersample="sampled", structures=names, exact=True)

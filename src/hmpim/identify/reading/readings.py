@@ -6,7 +6,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.derivatives import jacobian, products
-from hmpim.identify.fitting.held_steps import in_whole_samples, is_all_behind_hold
+from hmpim.identify.fitting.held_steps import is_known_to_a_sample
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import deviation_of_mean
 from hmpim.identify.noise.covariance import covariance, white_covariance
@@ -85,7 +85,7 @@ def read_parameters(
     fit = joint.best.fit
     structure = fit.structure
     vector = np.concatenate([fit.theta, fit.linear])
-    if in_whole_samples(structure, held=is_all_behind_hold(joint.problem.source, fit.structure)):
+    if is_known_to_a_sample(joint.problem.source, structure):
         vector[0] = np.ceil(np.round(vector[0], 6)) - 0.5  # the middle of its last sample
     weighed = joint.weighed
     freedom = max(weighed.counted - vector.size, 1)
@@ -131,9 +131,7 @@ def read_parameters(
 def _covariance(joint: JointFit, gram: Real, residual: Real, *, freedom: int, white: bool) -> Real:
     """Covariance of theta and linear; a held, static system moves in whole samples only."""
     fit = joint.best.fit
-    whole = in_whole_samples(
-        fit.structure, held=is_all_behind_hold(joint.problem.source, fit.structure)
-    )
+    whole = is_known_to_a_sample(joint.problem.source, fit.structure)
     whole = whole or fit.structure.sampled  # its delay is a number of samples
     free = slice(int(whole), None)
     inner = None

@@ -16,7 +16,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.climb import climb
 from hmpim.identify.fitting.fit import CONVERGED, Fit, bounded_for, evaluating
-from hmpim.identify.fitting.held_steps import in_whole_samples, is_all_behind_hold
+from hmpim.identify.fitting.held_steps import is_known_to_a_sample
 from hmpim.identify.fitting.least_squares import inverted, solved
 from hmpim.identify.fitting.rows import Part, Problem
 from hmpim.identify.noise.autoregression import whitening_filter
@@ -242,9 +242,7 @@ class Fitted(Fit):
     def covariance(self) -> Real:
         """Covariance of theta, the numerator and the mean bias: the Cramér-Rao bound."""
         gram = self.moments.gram
-        if in_whole_samples(
-            self.structure, held=is_all_behind_hold(self.problem.source, self.structure)
-        ):
+        if is_known_to_a_sample(self.problem.source, self.structure):
             # In a static model the delay is uniform over the sample in which it ends; otherwise
             # figures are read at both ends of that sample.
             inverse = np.zeros_like(gram)
