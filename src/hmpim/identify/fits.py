@@ -133,7 +133,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
 
-    found = with_plain_drift(former.problem, former.best, begun, fitted)
+    found = with_plain_drift(former.problem.y.size, begun, fitted)
     if found is None or not found[0].related:
         return None
     joint, drifting = found
@@ -289,7 +289,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         freed = _all_free(question, plain, asked)
         return None if freed is None else freed.fits[asked]
 
-    found = with_plain_drift(first.problem, first.best.fit, begun, fitted, steadily)
+    found = with_plain_drift(first.problem.y.size, begun, fitted, steadily)
     if found is None or not found[0].related:
         return None
     drifting = found[1]

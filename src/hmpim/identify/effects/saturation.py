@@ -83,8 +83,6 @@ def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 
 def _upper(y: Real, prediction: Real | None, step: float, scatter: float) -> Side | None:
     """The upper level of equal values; None where there is none."""
     span = float(np.ptp(y))
-    if span == 0.0:
-        return None
     side = _exact(y, span, step)
     clipped = side is not None and _is_clipped(y, side, prediction, step, span, scatter)
     return side if clipped else None

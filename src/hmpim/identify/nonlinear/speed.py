@@ -20,7 +20,6 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.mechanisms import LONGEST, LONGEST_AUTOREGRESSION, RATES
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import PART, TWICE
@@ -28,7 +27,7 @@ from hmpim.model.fine import FINE, finely, sampled
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.operators import rate_limited
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Finding, Intersample
+from hmpim.record import Finding
 
 __all__ = ["LimitedCommand", "explains_more", "limited_command", "speed_finding", "with_free_speed"]
 
@@ -46,7 +45,6 @@ class LimitedCommand:
     values: Real  # (n,): what the unit follows, at the samples
     recorded: Real  # (n,): the command
     slope: Real  # (n,): partial derivative of the output by the speed, up to a factor
-    between: Intersample  # what the command does between its samples
 
     def part(self, fs: float) -> NonlinearPart:
         """What a model needs of it, for samples at `fs` in Hz."""
@@ -56,7 +54,7 @@ class LimitedCommand:
             size=self.speed * fs,
             std=self.std * fs,
             reach=self.fastest * fs,
-            between=self.between,
+            between="bandlimited",
         )
 
 
@@ -65,7 +63,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
 
     No limit is tried if the residual of a plain fit is white, or if a richer fit has less than 1/25
     of the best plain one's cost. None unless a limit explains more than the linear fit (odds of 400
-    to 1), and more than any other kind of nonlinearity.
+    to 1).
     """
     best, problem = joint.best, joint.problem
     known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)
@@ -75,29 +73,13 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     start = min(plain, key=lambda trial: trial.criterion)
     if best.fit.cost < PART**2 * start.fit.cost:
         return None  # a limit makes harmonics, which poles cannot imitate that well
-    # Between its samples the command may be smooth; a held one jumps, at any speed.
-    command = _Followed.of(u, "bandlimited", problem, start.fit)
+    command = _Followed.of(u, problem, start.fit)
     linear = fit_structure(problem, best.fit.structure, best.fit.theta)  # as those with a limit
     near = _nearest(command, linear)
-    if near is None:
-        return None
-    found = _profiled(u, command, *near)
-    speed, least = near if found is None else (found[0].speed / FINE, found[1])
-    other = _Followed.of(u, "foh", problem, start.fit)
-    if other.fit(speed, least).cost < TWICE * least.cost:
-        both = [each for each in (found, _profiled(u, other, speed, least)) if each]
-        found = min(both, key=lambda each: each[1].cost, default=None)
+    found = None if near is None else _profiled(u, command, *near)
     if found is None or not explains_more(problem, found[1], problem, linear):
         return None
-    limited, fit = found
-    plainly = linear
-    if start is not best:
-        plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
-    gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
-    others = bends(u, problem, plainly, intersample=start.intersample)
-    if any(other.kind != "rate_limit" and other.gain > gained for other in others):
-        return None
-    return limited
+    return found[0]
 
 
 def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
@@ -137,17 +119,16 @@ class _Followed:
     """A command on the finer clock, and the data with a plain fit to them."""
 
     fine: Real
-    between: Intersample
     fastest: float  # greatest speed of the command, in the input's unit per fine step
     problem: Problem
     start: Fit
 
     @classmethod
-    def of(cls, u: Real, mode: Intersample, problem: Problem, start: Fit) -> "_Followed":
-        """Take the command from its first sample to its last."""
-        fine = finely(u, mode)
+    def of(cls, u: Real, problem: Problem, start: Fit) -> "_Followed":
+        """Take the command from its first sample to its last; between them it is band-limited."""
+        fine = finely(u, "bandlimited")
         fastest = float(np.max(np.abs(np.diff(fine))))
-        return cls(fine=fine, between=mode, fastest=fastest, problem=problem, start=start)
+        return cls(fine=fine, fastest=fastest, problem=problem, start=start)
 
     def at(self, speed: float) -> Problem:
         """The data, with the command as it is followed at this speed."""
@@ -222,7 +203,6 @@ def _profiled(
         values=_followed(command.fine, share * fastest),
         recorded=u,
         slope=command.slope(share * fastest, fit),
-        between=command.between,
     )
     return limited, fit
 
