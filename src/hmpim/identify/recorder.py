@@ -23,7 +23,7 @@ from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import TIMING
-from hmpim.identify.worth import FEW, MOST, TWICE
+from hmpim.identify.worth import FEW, MOST, PART, TWICE
 from hmpim.record import Channel, Finding, Signal, fit_clock, on_grid
 from hmpim.record.resample import CROSSINGS, share_above
 from hmpim.record.runs import runs_of
@@ -334,10 +334,13 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
     values = _filled(question, source, known).values.copy()
     values[at[-1] :] = source.values[at[-1]]
     read = _with_input(question, i, replace(source, values=values))
-    # Near the ends of the record a spline replaces the band-limited interpolation.
-    accurate = np.zeros(known.size, dtype=bool)
-    accurate[at[:CROSSINGS][-1] : at[-CROSSINGS:][0]] = True
-    output = replace(question.output, valid=question.output.valid & accurate)
+    # Near the ends of the record a spline replaces the band-limited interpolation. It is inaccurate
+    # if the input moves faster than a fifth of the slow rate there.
+    valid = question.output.valid.copy()
+    first, last = at[:CROSSINGS], at[-CROSSINGS:]
+    for end, here in ((first, slice(first[-1])), (last, slice(last[0], None))):
+        valid[here] &= share_above(source.values[end], fs=slow, limit=PART * slow) < _FOLDED
+    output = replace(question.output, valid=valid)
     smooth = replace(read, output=output, intersample="bandlimited")
     return _Suspect(question=smooth, finding=finding, if_undecided=undecided)
 

@@ -73,11 +73,7 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
     """Measure the harmonics of a sweep, and find the kinds that may make them."""
     residual = thinned(fit.residual, subject.block)
     rate, delay = subject.fs / subject.block, fit.delay / subject.fs
-    if (
-        white
-        and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM
-        and not _curved(fit, subject.problem)
-    ):
+    if white and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM:
         return Outcome(fit=fit)
     phases = [sweep_phase(thinned(other, subject.block), rate) for other in subject.others]
     others = [phase for phase in phases if phase is not None]
@@ -91,7 +87,7 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
     significant = bool(parts) or harmonics.regression.evidence > LIKELIER
-    if significant and not subject.others and np.ptp(fit.prediction) > 0:
+    if significant and not subject.others:
         model = thinned(fit.prediction - fit.linear[-1], subject.block)
         denominator = fit.denominator / float(subject.block) ** np.arange(fit.denominator.size)
         kinds = compare_harmonics(harmonics.regression, model, denominator, fs=rate)
@@ -110,7 +106,7 @@ def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
     if period is not None and problem.valid is None and u.size >= 3 * period:
         lines = detection_lines(u[period:], problem.y[period:], period=period)  # after transients
     levels = [v for v in lines if v.probability < FALSE_ALARM]
-    if white and not levels and not _curved(fit, problem):
+    if white and not levels:
         return Outcome(fit=fit, lines=lines)
     power = fit.cost / max(problem.counted, 1)
     least = 0.0
@@ -148,26 +144,17 @@ def criterion_of(subject: Subject, outcome: Outcome) -> float:
     e = thinned(outcome.fit.residual, subject.block)
     unknown, cost = outcome.fit.structure.parameters, float(e @ e)
     if outcome.named and outcome.named[0].trace.size == e.size:
-        trace = outcome.named[0].trace
-        if subject.problem.valid is not None:
-            trace = trace * thinned(subject.problem.valid.astype(np.float64), subject.block)
         rows = [thinned(row, subject.block) for row in jacobian(subject.problem, outcome.fit)]
-        basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
+        basis = np.linalg.qr(np.stack([*rows, outcome.named[0].trace]).T)[0]
         cost -= float(np.sum((basis.T @ e) ** 2))
         unknown += 1
     return e.size * float(np.log(max(cost, np.finfo(float).tiny))) + unknown * float(np.log(e.size))
 
 
-def _curved(fit: Fit, problem: Problem) -> bool:
-    """Whether a white residual follows the square, cube or direction of its model's output."""
-    x = fit.prediction - fit.linear[-1]
-    return bool(are_curved(x[None], fit.residual[None], problem.valid)[0])
-
-
-def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Mask:
+def are_curved(models: Real, residuals: Real) -> Mask:
     """Which white residuals, (k, n), follow the square, cube or direction of their models' output.
 
-    `models` holds the outputs of the linear models, without bias; all samples count, or `counted`.
+    `models` holds the outputs of the linear models, without bias.
     """
     size = np.std(models, axis=1)
     moving = size > 0
@@ -180,7 +167,6 @@ def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Ma
         step = np.gradient(near, axis=1)[:, before : before + x.shape[1]]
         cube, direction = x * x * x / size, np.sign(step) * size
         rows = np.stack([np.ones_like(x), x, step, x**2, cube, direction, e], axis=1)
-        rows = rows if counted is None else rows[:, :, counted[here]]
         gram += rows @ rows.transpose(0, 2, 1)
     count, power = gram[:, 0, 0], gram[:, 6, 6]
     scale = np.sqrt(np.einsum("kii->ki", gram[:, :6, :6]))
