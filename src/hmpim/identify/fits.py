@@ -45,7 +45,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName

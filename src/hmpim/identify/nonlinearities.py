@@ -12,7 +12,7 @@ from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
 from hmpim.identify.noise.input_noise import input_noise
-from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
+from hmpim.identify.nonlinear.bends import Bend, bends
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
@@ -122,19 +122,7 @@ def looked_through(
         return joint, inspection, unseen
     if inspection is not None and inspection.fit is not best.fit:
         return taking(joint, inspection.fit), inspection, unseen
-    if plain is None or best.fit.structure.sampled:
-        return joint, inspection, unseen
-    look_at_bends = partial(
-        is_bent_instead,
-        source.values,
-        problem,
-        fit,
-        plain,
-        intersample=best.intersample,
-        floor=floor,
-    )
-    bent_instead, untried = attempt("bends", look_at_bends, False)
-    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
+    return joint, inspection, unseen
 
 
 def possible_bends(
@@ -142,7 +130,6 @@ def possible_bends(
     found: Imperfections,
     joint: JointFit,
     i: int,
-    plain: Fit | None,
     said: tuple[Finding, ...],
 ) -> tuple[Bend, ...]:
     """How far a nonlinearity may have moved the figures; not tested where it made all doubtful.
@@ -156,5 +143,4 @@ def possible_bends(
         return ()
     u = question.aligned.inputs[i].values
     floor = found.floor(question.output.values)
-    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, floor=floor)
-    return (*own, *plainer_bends(u, joint, plain, floor=floor))
+    return bends(u, joint.weighed, best.fit, intersample=best.intersample, floor=floor)

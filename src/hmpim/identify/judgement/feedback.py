@@ -14,7 +14,7 @@ from hmpim.identify.judgement.residual import moved_by
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.worth import MOST
 from hmpim.record import Finding
 

@@ -1,8 +1,8 @@
-"""What a sweep's harmonics, unexcited lines, or traces show about one linear fit.
+"""What a sweep's harmonics, or traces, show about one linear fit.
 
-The evidence comes first: harmonics above the noise, output at lines that the input does not excite,
-traces that gain likelihood. Then come the kinds that remain possible, and the question whether a
-plainer linear structure with one kind explains more than a rich one alone.
+The evidence comes first: harmonics above the noise, or traces that gain likelihood. Then come the
+kinds that remain possible, and the question whether a plainer linear structure with one kind
+explains more than a rich one alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonics, sweep_harmonics
-from hmpim.identify.nonlinear.lines import LineLevel, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, compare_mechanisms
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
@@ -47,7 +47,6 @@ class Outcome:
 
     fit: Fit
     harmonics: Harmonics | None = None
-    lines: tuple[LineLevel, ...] = ()
     mechanisms: tuple[Mechanism, ...] = ()  # the likeliest first
     named: tuple[Mechanism, ...] = ()  # those of them that remain possible
     rms: float = 0.0  # of the nonlinear part, in the output's unit
@@ -99,29 +98,16 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
 
 
 def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
-    """Test unexcited lines, if the input repeats, and whether any kind explains the residual."""
-    u, problem = subject.u, subject.problem
-    period = find_period(u)
-    lines: tuple[LineLevel, ...] = ()
-    if period is not None and problem.valid is None and u.size >= 3 * period:
-        lines = detection_lines(u[period:], problem.y[period:], period=period)  # after transients
-    levels = [v for v in lines if v.probability < FALSE_ALARM]
-    if white and not levels:
-        return Outcome(fit=fit, lines=lines)
-    power = fit.cost / max(problem.counted, 1)
-    least = 0.0
-    if not white:  # missing dynamics resemble every kind a little, more so with few lines
-        least = power * (PART if period is None else MOST)
-    kinds = compare_mechanisms(problem, fit, fs=subject.fs)
+    """Test whether any kind explains the residual."""
+    if white:
+        return Outcome(fit=fit)
+    # Missing dynamics resemble every kind a little, more so with few lines.
+    share = PART if find_period(subject.u) is None else MOST
+    least = share * fit.cost / max(subject.problem.counted, 1)
+    kinds = compare_mechanisms(subject.problem, fit, fs=subject.fs)
     found = tuple(m for m in kinds if m.gain > _GAIN and m.rms**2 > least)
-    distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
-    return Outcome(
-        fit=fit,
-        lines=lines,
-        mechanisms=found,
-        named=_likely(found, 0.0),
-        rms=max(distortion, found[0].rms if found else 0.0),
-    )
+    rms = found[0].rms if found else 0.0
+    return Outcome(fit=fit, mechanisms=found, named=_likely(found, 0.0), rms=rms)
 
 
 def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, ...]:
