@@ -74,8 +74,7 @@ class GainChange:
     change: float
     std: float
     share: float  # of the residual's power that it explains, for the fit with a constant gain
-    # fits of other shapes that are about as likely; `joint`'s own if the change is not taken
-    others: tuple[Fit, ...]
+    others: tuple[Fit, ...]  # fits about as likely: `joint`'s own if the change is not taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -113,18 +113,19 @@ def find_imperfections(
     """Look for saturation, hold, rounding, spikes and standstills in an output, (n,).
 
     Samples that are not `valid` were filled in, and lie on no grid. The prediction of a first model
-    distinguishes a plateau from a crest, and shows spikes and standstills. `inputs` show whether
+    shows saturation, spikes and standstills. `inputs` show whether
     the output takes too few values, or stands still to its end; without them, neither is tested.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
-    levels = detect_saturation(y, prediction, step=step)
-    clipping = levels if any(_sides(levels)) and levels.share <= NEARLY else None
     hold = detect_hold(y, fs, prediction)
-    spikes = frozen = None
+    clipping = spikes = frozen = None
+    if prediction is not None:
+        levels = detect_saturation(y, prediction, step=step)
+        clipping = levels if any(_sides(levels)) and levels.share <= NEARLY else None
     if prediction is None and hold is None:
         frozen = find_stuck(y, inputs)
-    elif hold is None:
+    elif prediction is not None and hold is None:
         frozen = find_frozen(y, prediction, step=step)
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
@@ -226,7 +227,7 @@ def _weighed_again(
     moved = {
         trial.intersample: again[_kind(trial)].criterion - trial.criterion
         for trial in joint.trials
-        if _kind(trial) in again and trial.fit.structure == joint.best.fit.structure
+        if _kind(trial) in again
     }
     usual = moved.get(joint.best.intersample, 0.0)
     return tuple(
