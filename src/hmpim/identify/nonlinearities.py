@@ -118,19 +118,13 @@ def looked_through(
         unit=question.output.unit,
     )
     inspection, unseen = attempt("nonlinearity", look, None)
-    if bending is not None:
-        return joint, inspection, unseen
-    if inspection is not None and inspection.fit is not best.fit:
+    if bending is None and inspection is not None and inspection.fit is not best.fit:
         return taking(joint, inspection.fit), inspection, unseen
     return joint, inspection, unseen
 
 
 def possible_bends(
-    question: Question,
-    found: Imperfections,
-    joint: JointFit,
-    i: int,
-    said: tuple[Finding, ...],
+    question: Question, found: Imperfections, joint: JointFit, i: int, said: tuple[Finding, ...]
 ) -> tuple[Bend, ...]:
     """How far a nonlinearity may have moved the figures; not tested where it made all doubtful.
 

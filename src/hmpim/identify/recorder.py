@@ -8,6 +8,7 @@ without these samples, and the likelier of the two is kept.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -66,7 +67,7 @@ def leave_out_lost(question: Question) -> Question:
         return question
     question = _examined(question, _words(question))
     for i in range(len(question.aligned.inputs)):
-        for kind in (_pulses, _input_words, _repeats, _standstills, _slow_log):
+        for kind in (_pulses, partial(_pulses, equal=True), _repeats, _standstills, _slow_log):
             question = _examined(question, kind(question, i))
     return question
 
@@ -243,11 +244,6 @@ def _words(question: Question) -> _Suspect | None:
     )
     mended = replace(output, valid=output.valid & ~found)
     return _Suspect(question=replace(question, output=mended), finding=finding)
-
-
-def _input_words(question: Question, i: int) -> _Suspect | None:
-    """The question without fixed words in an input."""
-    return _pulses(question, i, equal=True)
 
 
 def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
