@@ -20,6 +20,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
+from hmpim.identify.nonlinear.bends import bends
 from hmpim.identify.nonlinear.mechanisms import LONGEST, LONGEST_AUTOREGRESSION, RATES
 from hmpim.identify.result.digits import plus_minus
 from hmpim.identify.worth import PART, TWICE
@@ -63,7 +64,7 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
 
     No limit is tried if the residual of a plain fit is white, or if a richer fit has less than 1/25
     of the best plain one's cost. None unless a limit explains more than the linear fit (odds of 400
-    to 1).
+    to 1), and more than any other kind of nonlinearity.
     """
     best, problem = joint.best, joint.problem
     known = best.fit.structure.name in PLAIN and is_white(best.fit.residual)
@@ -79,7 +80,13 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     found = None if near is None else _profiled(u, command, *near)
     if found is None or not explains_more(problem, found[1], problem, linear):
         return None
-    return found[0]
+    limited, fit = found
+    plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
+    gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
+    others = bends(u, problem, plainly, intersample=start.intersample)
+    if any(other.kind != "rate_limit" and other.gain > gained for other in others):
+        return None
+    return limited
 
 
 def explains_more(limited: Problem, fit: Fit, linear: Problem, best: Fit) -> bool:
