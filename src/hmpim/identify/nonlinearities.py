@@ -12,7 +12,7 @@ from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
 from hmpim.identify.noise.input_noise import input_noise
-from hmpim.identify.nonlinear.bends import Bend, bends
+from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import explains_more, limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
@@ -118,9 +118,23 @@ def looked_through(
         unit=question.output.unit,
     )
     inspection, unseen = attempt("nonlinearity", look, None)
-    if bending is None and inspection is not None and inspection.fit is not best.fit:
+    if bending is not None:
+        return joint, inspection, unseen
+    if inspection is not None and inspection.fit is not best.fit:
         return taking(joint, inspection.fit), inspection, unseen
-    return joint, inspection, unseen
+    if plain is None or best.fit.structure.sampled:
+        return joint, inspection, unseen
+    look_at_bends = partial(
+        is_bent_instead,
+        source.values,
+        problem,
+        fit,
+        plain,
+        intersample=best.intersample,
+        floor=floor,
+    )
+    bent_instead, untried = attempt("bends", look_at_bends, False)
+    return taking(joint, plain) if bent_instead else joint, inspection, (*unseen, *untried)
 
 
 def possible_bends(

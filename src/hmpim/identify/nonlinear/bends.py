@@ -38,7 +38,7 @@ from hmpim.model.poles import rational_response
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Bend", "bends", "bent_shapes"]
+__all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead"]
 
 _EVERY = 3
 """Every third of a kind's values is tried: neighbouring values leave very similar traces."""
@@ -131,6 +131,31 @@ def bends(
         for i in np.argsort(-gains)
         if gains[i] > most - max(CLEARLY, PART * most)
     )
+
+
+def is_bent_instead(
+    u: Real,
+    problem: Problem,
+    fit: Fit,
+    plain: Fit,
+    *,
+    intersample: Intersample,
+    floor: float = 0.0,
+) -> bool:
+    """Whether a plain fit with one nonlinearity explains more than a rich fit, with or without one.
+
+    A second mode may imitate a hardening spring. The other arguments are as for `bends`.
+    """
+    if fit.cost < PART * plain.cost:  # no kind explains as much
+        return False
+    bent = bends(u, problem, plain, intersample=intersample, floor=floor)
+    if not bent or not bent[0].certain or fit.cost <= 0.0:
+        return False
+    gained = 0.5 * problem.counted * float(np.log(plain.cost / fit.cost))
+    if bent[0].gain <= gained:
+        return False
+    own = bends(u, problem, fit, intersample=intersample, floor=floor)
+    return bent[0].gain > gained + (own[0].gain if own else 0.0)
 
 
 def bent_shapes(u: Real, problem: Problem, fit: Fit, *, intersample: Intersample) -> Real:
