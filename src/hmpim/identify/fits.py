@@ -41,7 +41,7 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
 from hmpim.identify.noise.spectra import windowed_power
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.lines import find_period
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.preparation.question import Question
 from hmpim.identify.worth import PART
 from hmpim.model.dynamics import StructureName
@@ -129,7 +129,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
 
-    found = with_plain_drift(former.problem, former.best, begun, fitted)
+    found = with_plain_drift(former.problem.y.size, begun, fitted)
     if found is None:
         return None
     joint, drifting = found
@@ -216,7 +216,6 @@ class _WithRows:
         return OutputFit(fits=(joint,))
 
 
-
 def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
@@ -237,7 +236,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         plain = fit_once(question, seen, question.plain, rows, begun=known)
         return plain.fits[asked]
 
-    found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
+    found = with_plain_drift(first.problem.y.size, begun, fitted)
     if found is None or not found[0].related:
         return None
     steady = fit_once(question, seen, question.plain, begun=led)

@@ -11,7 +11,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.judgement import attempt
-from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead, plainer_bends
+from hmpim.identify.nonlinear.bends import Bend, bends, is_bent_instead
 from hmpim.identify.nonlinear.nonlinearity import Inspection, inspect_nonlinearity
 from hmpim.identify.nonlinear.speed import limited_command, with_free_speed
 from hmpim.identify.preparation.question import Question
@@ -129,12 +129,7 @@ def looked_through(
 
 
 def possible_bends(
-    question: Question,
-    found: Imperfections,
-    joint: JointFit,
-    i: int,
-    plain: Fit | None,
-    said: tuple[Finding, ...],
+    question: Question, found: Imperfections, joint: JointFit, i: int, said: tuple[Finding, ...]
 ) -> tuple[Bend, ...]:
     """How far a nonlinearity may have moved the figures; not tested where it made all doubtful.
 
@@ -147,5 +142,4 @@ def possible_bends(
         return ()
     u = question.aligned.inputs[i].values
     floor = found.floor(question.output.values)
-    own = bends(u, joint.weighed, best.fit, intersample=best.intersample, floor=floor)
-    return (*own, *plainer_bends(u, joint, plain, floor=floor))
+    return bends(u, joint.weighed, best.fit, intersample=best.intersample, floor=floor)

@@ -181,7 +181,7 @@ def _pair(own: _Followed) -> PairIdentification:
         units=own.units,
     )
     response = _measured(own, joint, readings)
-    bent = partial(possible_bends, question, own.found, joint, own.i, plain, said)
+    bent = partial(possible_bends, question, own.found, joint, own.i, said)
     moves, unmoved = attempt("bends", bent, ())
     read = partial(
         response_bandwidths,

@@ -7,10 +7,10 @@ trapezoid. The output decides: plain dynamics are fitted to the record as it is 
 without these samples, and the likelier of the two is kept.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from hmpim.identify.arrays import Mask, Real
@@ -65,12 +65,11 @@ def leave_out_lost(question: Question) -> Question:
     """
     if question.instrument is not None or question.intersample == "sampled":
         return question
-    search = _Search(question)
-    search.examine(_words(question))
+    question = _examined(question, _words(question))
     for i in range(len(question.aligned.inputs)):
-        for kind in (_pulses, _input_words, _repeats, _standstills, _slow_log):
-            search.examine(kind(search.question, i))
-    return search.question
+        for kind in (_pulses, partial(_pulses, equal=True), _repeats, _standstills, _slow_log):
+            question = _examined(question, kind(question, i))
+    return question
 
 
 def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
@@ -94,8 +93,6 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     # Of the _AROUND steps that end with step k, at place k + _AROUND.
     largest = maximum_filter1d(np.pad(speeds, _AROUND), _AROUND, origin=_AROUND // 2)
     sharp = np.flatnonzero(speeds > TWICE * largest[_AROUND - 1 :][: speeds.size]) + 1
-    if not sharp.size:
-        return None
     if equal:
         first, last = runs_of(np.concatenate([[False], moves == 0.0]))
         long = (last - first >= _LONGEST) & np.isin(first - 1, sharp)
@@ -140,87 +137,65 @@ def find_standstills(x: Real) -> Mask | None:
     return found if found.any() else None
 
 
-@dataclass(slots=True)
-class _Search:
-    """The question so far, and plain fits to it, which are made when first needed."""
-
-    question: Question
-    seen: Imperfections = field(default_factory=Imperfections)
-    looked: bool = False
-    fitted: OutputFit | None = None
-
-    def examine(self, suspect: _Suspect | None) -> None:
-        """Leave the suspect samples out if the record is then clearly likelier."""
-        if suspect is None or not _moves(suspect.question):
-            return
-        if not self.looked:
-            inputs = [source.values for source in self.question.aligned.inputs]
-            self.seen, self.looked = imperfections_of(self.question, inputs=inputs), True
-        before, again = self._compared(suspect)
-        spikes = find_spikes(self.question.output.values, again.prediction)
-        if spikes is not None and self.seen.spikes is None:
-            self.seen, self.fitted = replace(self.seen, spikes=spikes), None
-            before, again = self._compared(suspect)
-        gain = self._gain(suspect, before, again)
-        # Held or slowly recorded are two hypotheses; lost samples are searched for.
-        searches = suspect.if_undecided is None
-        if gain > (searched(self.question.output.values.size) if searches else CLEARLY):
-            self.question, self.fitted = _with(suspect.question, suspect.finding), again
-        elif suspect.if_undecided is not None and gain > -CLEARLY and _is_white(again):
-            self.question = _with(self.question, suspect.if_undecided)
-
-    def _compared(self, suspect: _Suspect) -> tuple[OutputFit, OutputFit]:
-        """Fits to the record as it is, and without the suspect samples.
-
-        Samples of the output are left out first and then added: they may hide the response.
-        """
-        again = _fitted(suspect.question, self.seen)
-        if suspect.question.aligned is self.question.aligned:
-            more = self.question.output.valid & ~suspect.question.output.valid
-            return _counting_too(again, more), again
-        if self.fitted is None:
-            self.fitted = _fitted(self.question, self.seen)
-        return self.fitted, again
-
-    def _gain(self, suspect: _Suspect, before: OutputFit, after: OutputFit) -> float:
-        """Gain in log-likelihood by leaving out what is lost.
-
-        At least half of all samples must count; the others may respond to lost ones. If these can
-        be filled in, the residual at all samples must not have more than twice its former power. A
-        long loss cannot be filled in, so the samples that respond to it have their own variance.
-        """
-        mended = suspect.question
-        related = [fit for fit in after.fits if fit.related]
-        if not related:
-            return -np.inf
-        known = counted_in(mended, self.seen)
-        every = np.ones(mended.output.values.size, dtype=bool) if known is None else known.copy()
-        every[: max(fit.forgotten for fit in (*before.fits, *related) if fit.related)] = False
-        masks = [fit.problem.valid for fit in related if fit.problem.valid is not None]
-        counts = np.logical_and.reduce([every, *masks])
-        if not counts.any() or np.count_nonzero(counts) < MOST * np.count_nonzero(every):
-            return -np.inf
-        worse = self._power(after, every) > TWICE * self._power(before, every)
-        if worse and not suspect.long:
-            return -np.inf
-        earlier, later = self._power(before, counts), self._power(after, counts)
-        if later == 0.0 or earlier == 0.0:
-            return -np.inf
-        gain, lost = 0.0, every & ~counts
-        if suspect.long and lost.any():
-            earlier, inside = self._power(before, every), max(self._power(after, lost), later)
-            gain = np.count_nonzero(lost) * float(np.log(earlier / inside))
-        gain += np.count_nonzero(counts) * float(np.log(earlier / later))
-        return 0.5 * min(fit.effective_share for fit in related) * gain
-
-    def _power(self, fitted: OutputFit, counts: Mask) -> float:
-        """Power of the residual about its mean."""
-        return float(np.var((self.question.output.values - fitted.prediction)[counts]))
+def _examined(question: Question, suspect: _Suspect | None) -> Question:
+    """The question without the suspect samples if the record is then clearly likelier."""
+    if suspect is None or not _moves(suspect.question):
+        return question
+    seen = imperfections_of(question, inputs=[u.values for u in question.aligned.inputs])
+    before, again = _compared(question, suspect, seen)
+    spikes = find_spikes(question.output.values, again.prediction)
+    if spikes is not None:
+        seen = replace(seen, spikes=spikes)
+        before, again = _compared(question, suspect, seen)
+    gain = _gain(suspect, seen, before, again)
+    # Held or slowly recorded are two hypotheses; lost samples are searched for.
+    searches = suspect.if_undecided is None
+    if gain > (searched(question.output.values.size) if searches else CLEARLY):
+        return _with(suspect.question, suspect.finding)
+    if suspect.if_undecided is not None and gain > -CLEARLY:
+        return _with(question, suspect.if_undecided)
+    return question
 
 
-def _is_white(fitted: OutputFit) -> bool:
-    """Whether the fits leave white noise, so that richer dynamics need not be tried."""
-    return all(fit.best.fit.is_white for fit in fitted.fits if fit.related)
+def _compared(
+    question: Question, suspect: _Suspect, seen: Imperfections
+) -> tuple[OutputFit, OutputFit]:
+    """Fits to the record as it is, and without the suspect samples.
+
+    Samples of the output are left out first and then added: they may hide the response.
+    """
+    again = _fitted(suspect.question, seen)
+    if suspect.question.aligned is question.aligned:
+        more = question.output.valid & ~suspect.question.output.valid
+        return _counting_too(again, more), again
+    return _fitted(question, seen), again
+
+
+def _gain(suspect: _Suspect, seen: Imperfections, before: OutputFit, after: OutputFit) -> float:
+    """Gain in log-likelihood by leaving out what is lost.
+
+    At least half of all samples must count; the others may respond to lost ones. A long loss cannot
+    be filled in, so the samples that respond to it have their own variance.
+    """
+    y, fits = suspect.question.output.values, (*before.fits, *after.fits)
+    known = counted_in(suspect.question, seen)
+    every = np.ones(y.size, dtype=bool) if known is None else known.copy()
+    every[: max(fit.forgotten for fit in fits)] = False
+    masks = [fit.problem.valid for fit in after.fits if fit.problem.valid is not None]
+    counts = np.logical_and.reduce([every, *masks])
+    if np.count_nonzero(counts) < MOST * np.count_nonzero(every):
+        return -np.inf
+
+    def power(fitted: OutputFit, here: Mask) -> float:
+        return max(float(np.var((y - fitted.prediction)[here])), np.finfo(float).tiny)
+
+    earlier, later = power(before, counts), power(after, counts)
+    gain, lost = 0.0, every & ~counts
+    if suspect.long and lost.any():
+        earlier, inside = power(before, every), max(power(after, lost), later)
+        gain = np.count_nonzero(lost) * float(np.log(earlier / inside))
+    gain += np.count_nonzero(counts) * float(np.log(earlier / later))
+    return 0.5 * min(fit.effective_share for fit in after.fits) * gain
 
 
 def _with(question: Question, finding: Finding) -> Question:
@@ -256,7 +231,7 @@ def _words(question: Question) -> _Suspect | None:
     """The question without fixed words in the output: equal values, far from those around."""
     output = question.output
     found = find_pulses(output.values, output.valid, equal=True)
-    if found is None or np.mean(found) > FEW:
+    if found is None:
         return None
     value = output.values[np.argmax(found)]
     finding = Finding(
@@ -269,11 +244,6 @@ def _words(question: Question) -> _Suspect | None:
     )
     mended = replace(output, valid=output.valid & ~found)
     return _Suspect(question=replace(question, output=mended), finding=finding)
-
-
-def _input_words(question: Question, i: int) -> _Suspect | None:
-    """The question without fixed words in an input."""
-    return _pulses(question, i, equal=True)
 
 
 def _pulses(question: Question, i: int, *, equal: bool = False) -> _Suspect | None:
@@ -333,7 +303,7 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
     """The question with an input interpolated that a slower clock records, if it is smooth."""
     source, fs = question.aligned.inputs[i], question.aligned.fs
     at = updates(source.values)
-    if at is None or question.intersample is not None or not source.valid.all():
+    if at is None or question.intersample is not None:
         return None
     slow = fs * (at.size - 1) / float(at[-1] - at[0])
     if share_above(source.values[at], fs=slow, limit=_SMOOTH * slow) > _FOLDED:
@@ -360,25 +330,15 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
     values = _filled(question, source, known).values.copy()
     values[at[-1] :] = source.values[at[-1]]
     read = _with_input(question, i, replace(source, values=values))
-    output = replace(
-        question.output, valid=question.output.valid & _follows_readings(source.values, at, slow)
-    )
+    # Near the ends of the record a spline replaces the band-limited interpolation. It is inaccurate
+    # if the input moves faster than a fifth of the slow rate there.
+    valid = question.output.valid.copy()
+    first, last = at[:CROSSINGS], at[-CROSSINGS:]
+    for end, here in ((first, slice(first[-1])), (last, slice(last[0], None))):
+        valid[here] &= share_above(source.values[end], fs=slow, limit=PART * slow) < _FOLDED
+    output = replace(question.output, valid=valid)
     smooth = replace(read, output=output, intersample="bandlimited")
     return _Suspect(question=smooth, finding=finding, if_undecided=undecided)
-
-
-def _follows_readings(u: Real, at: NDArray[np.intp], slow: float) -> Mask:
-    """Samples, (n,), at which the interpolated input is accurate.
-
-    Near the ends of the record a spline replaces the band-limited interpolation. It is inaccurate
-    if the input moves faster than a fifth of the slow rate there.
-    """
-    follows = np.ones(u.size, dtype=bool)
-    if at.size > 2 * CROSSINGS:
-        first, last = at[:CROSSINGS], at[-CROSSINGS:]
-        follows[: first[-1]] = share_above(u[first], fs=slow, limit=PART * slow) < _FOLDED
-        follows[last[0] :] = share_above(u[last], fs=slow, limit=PART * slow) < _FOLDED
-    return follows
 
 
 def _samples(found: Mask) -> str:

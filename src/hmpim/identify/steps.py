@@ -10,7 +10,6 @@ from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.effects.gain import changing_gain
 from hmpim.identify.effects.imperfections import Imperfections
 from hmpim.identify.effects.lost_samples import stand_out
-from hmpim.identify.effects.quantization import is_predicted
 from hmpim.identify.fits import counted_in, fit_once, imperfections_of, started
 from hmpim.identify.fitting.course import Course, continued, turn_ahead
 from hmpim.identify.fitting.fit import Fit, Problem
@@ -57,7 +56,6 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if question.exact:
         return seen
     first = fitted.fits[0]
-    seen = _without_clusters(question, seen, fitted)
     residual = first.best.fit.residual
     limited = seen.saturation is not None or seen.hold is not None
     if not limited and is_white(residual) and not stand_out(first.problem.counting(residual)):
@@ -70,17 +68,6 @@ def look_again(question: Question, seen: Imperfections, fitted: OutputFit) -> Im
     if plateau is None and before is not None and before.noise == "after":
         return replace(again, saturation=before)
     return again
-
-
-def _without_clusters(question: Question, seen: Imperfections, fitted: OutputFit) -> Imperfections:
-    """Drop a rounding grid that the model explains: an input of few levels produces one."""
-    if seen.quantization is None:
-        return seen
-    y, valid = question.output.values, counted_in(question, seen)
-    counted = np.ones(y.size, dtype=bool) if valid is None else valid.copy()
-    counted[: fitted.fits[0].forgotten] = False
-    explained = is_predicted(seen.quantization, y[counted], fitted.prediction[counted])
-    return replace(seen, quantization=None) if explained else seen
 
 
 def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) -> OutputFit:

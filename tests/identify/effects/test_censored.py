@@ -239,7 +239,7 @@ def test_a_record_that_is_all_clipped_is_refused(source, clean):
 
 def test_a_noise_taken_far_too_loud_leads_to_no_endless_step(source, clean, truth):
     """Under such a noise samples just inside the level bend the likelihood upwards."""
-    levels = detect_saturation(np.clip(clean, None, 0.5))
+    levels = detect_saturation(np.clip(clean, None, 0.5), clean)
     problem = Problem(source=source, y=np.clip(clean, None, 0.5), valid=None, longest_delay=1000.0)
     data = censored._data(problem, levels, None, None)
     loud = next(

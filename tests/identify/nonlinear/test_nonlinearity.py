@@ -195,7 +195,7 @@ def test_kinds_are_told_without_a_sweep_too():
         assert found.findings[1].code == code
 
 
-def test_a_periodic_input_shows_its_distortion_at_lines_left_out():
+def test_a_periodic_input_shows_even_distortion():
     k = np.arange(1, 100, 2)[:, None]
     phase = np.random.default_rng(0).uniform(0, 6, k.shape)
     u = np.tile(np.cos(2 * np.pi * k * np.arange(1000) / 1000 + phase).sum(axis=0) / 5, 5)
@@ -203,8 +203,8 @@ def test_a_periodic_input_shows_its_distortion_at_lines_left_out():
     problem = Problem(source=prepare_input(u, "foh"), y=y, valid=None, longest_delay=100.0)
     fit = fit_structure(problem, STRUCTURES["static"], np.zeros(1))
     found = inspect_nonlinearity(u, problem, fit, fs=FS)
-    assert [level.parity for level in found.seen.lines] == ["even"]
-    assert "even lines left out" in found.findings[0].message
+    assert found.seen.mechanisms[0].kind == "asymmetry"
+    assert "even in the deflection" in found.findings[0].message
 
 
 def test_the_size_of_a_nonlinearity_scales_with_the_units():

@@ -24,7 +24,6 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import inverted
 from hmpim.identify.noise.autoregression import autoregression, spectrum_of_filter
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import NEARLY
 
 __all__ = ["CensoredFit", "fit_censored"]
 
@@ -179,31 +178,19 @@ def _start(data: _Data, fit: Fit) -> _State:
             f"{np.count_nonzero(inside)} of {inside.size} samples are inside the range, too few "
             f"for {unknown} parameters; drive the unit less hard, or record longer"
         )
-    begun = fit
-    if data.low.any() or data.high.any():
-        valid = np.zeros(data.problem.y.size, dtype=bool)
-        valid[data.arrivals.index[inside]] = True
-        begun = fit_structure(replace(data.problem, valid=valid), fit.structure, fit.theta)
-    theta = begun.theta.copy()
-    if data.arrivals.index.size < NEARLY * data.problem.y.size:
-        gaps = np.diff(data.arrivals.index)
-        theta[0] -= 0.5 * float(np.median(gaps)) if begun is fit else 0.5
-    begun = replace(begun, theta=theta)
+    valid = np.zeros(data.problem.y.size, dtype=bool)
+    valid[data.arrivals.index[inside]] = True
+    begun = fit_structure(replace(data.problem, valid=valid), fit.structure, fit.theta)
     rows = rows_at_updates(data.problem, begun, data.arrivals)
-    residual = (data.y - begun.linear @ rows[theta.size :])[inside]
+    residual = (data.y - begun.linear @ rows[begun.theta.size :])[inside]
     sigma = max(float(np.std(residual)), _LEAST_NOISE * float(np.std(data.y)))
-    state = _evaluated(data, begun, float(np.log(sigma)))
-    if state is None:
-        raise RecordError("the fit to the samples inside the range is not finite; check the data")
-    return state
+    return _evaluated(data, begun, float(np.log(sigma)))
 
 
-def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State | None:
-    """Return the log-likelihood and its derivatives; None if they are not finite."""
+def _evaluated(data: _Data, fit: Fit, log_sigma: float) -> _State:
+    """Return the log-likelihood and its derivatives."""
     rows = rows_at_updates(data.problem, fit, data.arrivals)
     prediction = fit.linear @ rows[fit.theta.size :]
-    if not np.all(np.isfinite(prediction)):
-        return None
     level = rows.mean(axis=1)
     level[-1] = 0.0
     rows = rows - level[:, None]
@@ -261,7 +248,7 @@ def _step(state: _State, damping: float) -> Real:
 
 
 def _moved(data: _Data, state: _State, step: Real) -> _State | None:
-    """Return the state after a step, which is shortened if it changes the dynamics too much."""
+    """The state after a step, shortened if it changes the dynamics too much; None out of reach."""
     fit, unknown = state.fit, state.fit.theta.size
     room = _LARGEST_STEP * np.maximum(1.0, np.abs(fit.theta))
     room[0] = 10.0
@@ -269,9 +256,6 @@ def _moved(data: _Data, state: _State, step: Real) -> _State | None:
     step = step / excess
     step[-2] -= float(state.level @ step[:-1])
     moved = replace(fit, theta=fit.theta + step[:unknown], linear=fit.linear + step[unknown:-1])
-    denominator = moved.denominator
-    if not (np.all(np.isfinite(denominator)) and np.all(denominator >= 0)):
-        return None
     if not data.problem.shortest_delay <= moved.delay <= data.problem.longest_delay:
         return None
     floor = np.log(_LEAST_NOISE * max(float(np.std(data.y)), np.finfo(float).tiny))

@@ -23,7 +23,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import MOST, PART, TWICE
+from hmpim.identify.worth import PART, TWICE
 from hmpim.record import Finding
 
 __all__ = ["Drifting", "drift_findings", "drift_rows", "is_slow", "with_drift", "with_plain_drift"]
@@ -85,29 +85,19 @@ def with_drift(first: JointFit, fitted: _Fitted) -> tuple[JointFit, Drifting | N
 
 
 def with_plain_drift(
-    problem: Problem, fit: Fit, begun: _Begun, fitted: Callable[[Real], JointFit]
+    size: int, begun: _Begun, fitted: Callable[[Real], JointFit]
 ) -> tuple[JointFit, Drifting] | None:
-    """Add a drift to plain dynamics; keep it if that leaves white noise.
+    """Add a drift to plain dynamics of `size` samples, if that leaves white noise; else None.
 
-    `problem` and `fit` are the data and the best plain fit with a constant bias. `begun` makes the
-    plain fits with rows for the drift and returns the best of them and its data; `fitted` makes the
-    joint fit of plain structures. The values are as for `with_drift`.
-
-    None if a constant bias is enough, if the model is as slow as a drift, or if the residual is not
-    white.
+    `begun` makes the plain fits with rows for the drift and returns the best of them and its data;
+    `fitted` makes the joint fit of plain structures. The values are as for `with_drift`.
     """
-    every = drift_rows(problem.y.size)
+    every = drift_rows(size)
     data, free = begun(every)
-    if data.counted < max(_FEWEST, MOST * problem.counted) or not free.is_white:
+    if not free.is_white:
         return None
     columns = _shape(data, free, every)
-    joint = fitted(columns)
-    if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
-        return None
-    gain = criterion_gain(joint, len(columns), fit, problem)
-    if gain < 0.0:
-        return None
-    return _without_drift(joint, columns)
+    return _without_drift(fitted(columns), columns)
 
 
 def _without_drift(joint: JointFit, columns: Real) -> tuple[JointFit, Drifting]:

@@ -31,7 +31,7 @@ def with_imperfections(
         figures["hold_period"] = estimate(hold.period, hold.std**2, unit="s")
     if rounding is not None:
         figures["quantization_step"] = estimate(rounding.step, rounding.std**2, unit=unit)
-    if censored is not None and parameters.noise_std is not None:
+    if censored is not None:
         figures["noise_std"] = estimate(
             censored.noise_std,
             censored.noise_std_std**2,

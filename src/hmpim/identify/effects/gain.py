@@ -23,7 +23,7 @@ from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import PART, TWICE, WORTH
+from hmpim.identify.worth import WORTH
 
 __all__ = ["GainChange", "Scored", "changing_gain", "scored"]
 
@@ -74,8 +74,7 @@ class GainChange:
     change: float
     std: float
     share: float  # of the residual's power that it explains, for the fit with a constant gain
-    # fits of other shapes that are about as likely; `joint`'s own if the change is not taken
-    others: tuple[Fit, ...]
+    others: tuple[Fit, ...]  # fits about as likely: `joint`'s own if the change is not taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,30 +113,21 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     None if no change is significant, or if something else explains more.
     """
     best = first.best.fit
-    if best.structure.integrators or best.structure.sampled or best.objective <= 0.0:
+    if best.structure.integrators or best.structure.sampled:
         return None
     begin, share = _first_scores(first, otherwise)
-    found = _tried(first, begin, fitted)
-    if not found:
+    if not begin:
         return None
-    lead = max(found, key=lambda one: one.gained)
+    lead = max(_tried(first, begin, fitted), key=lambda one: one.gained)
     fit = lead.joint.best.fit
     data = _without_rows(lead.joint.problem, len(lead.score.rows), first.problem.y)
     constant = fit_structure(data, fit.structure, fit.theta)
-    least = min(fit.cost, (1.0 - share) * best.cost)
-    if (1.0 - otherwise(data, constant)) * constant.cost < least:
-        return None
     elsewhere = _gain_elsewhere(data, constant, tuple(sorted({0.0, lead.score.rate})))
     if not lead.white and best.structure.name not in PLAIN:
-        lead = _settled(first, lead.score, fitted, plainly=False) or lead
+        lead = _settled(first, lead.score, fitted, plainly=False)
     score = lead.score
-    if lead.gained < -2 * CLEARLY or abs(score.change) <= max(WORTH, DEVIATIONS * score.std):
+    if abs(score.change) <= max(WORTH, DEVIATIONS * score.std):
         return None
-    near = tuple(
-        one.joint.best.fit
-        for one in found
-        if one.joint is not lead.joint and one.gained > lead.gained - 2 * CLEARLY
-    )
     # The change is only a doubt with rich dynamics, where it may replace a missing pole, and if a
     # change of the delay or the dynamics explains about as much.
     plain = lead.joint.best.fit.structure.name in PLAIN
@@ -151,7 +141,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
         change=score.change,
         std=score.std,
         share=0.0 if taken else share,
-        others=near if taken else (lead.joint.best.fit, *near),
+        others=() if taken else (lead.joint.best.fit,),
     )
 
 
@@ -185,58 +175,37 @@ class _Settled:
 
 
 def _tried(first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted) -> list[_Settled]:
-    """Plain fits with a steady change and one that settles, without those that cannot win."""
+    """Plain fits with a steady change and one that settles."""
     steady = [score for score in begin if not score.rate]
     settling = sorted((score for score in begin if score.rate), key=lambda score: -score.gain)
-    found, hopeless = [], np.inf
-    for score in (*steady[:1], *settling[:1]):
-        one = _settled(first, score, fitted, hopeless=hopeless)
-        if one is not None:
-            found.append(one)
-            hopeless = min(hopeless, TWICE**2 * one.joint.best.fit.cost)
-    return found
+    return [_settled(first, score, fitted) for score in (*steady[:1], *settling[:1])]
 
 
-def _settled(
-    first: JointFit,
-    begin: Scored,
-    fitted: _Fitted,
-    *,
-    hopeless: float = np.inf,
-    plainly: bool = True,
-) -> _Settled | None:
-    """Make the joint fit with a change of one shape; None if `hopeless` or more is its cost.
+def _settled(first: JointFit, begin: Scored, fitted: _Fitted, *, plainly: bool = True) -> _Settled:
+    """Make the joint fit with a change of one shape.
 
     The output is divided by the gain so far, so that the row explains little. Its exact
     form, and the assumption between the samples, then do not matter.
     """
     y, score, spread = first.problem.y, begin, _STEP
     fit, problem = first.best.fit, first.problem
-    for turn in range(_ROUNDS):
-        course = 1.0 + score.change * score.shape
-        if course.min() < _LEAST:
-            return None
+    for _ in range(_ROUNDS):
+        course = np.maximum(1.0 + score.change * score.shape, _LEAST)
         # The output at the input's initial level does not change with the gain.
         initial = part_of(problem, fit.structure, fit.theta).level
         level = float(fit.linear[-1] + fit.linear[0] * initial)
         joint = fitted(level + (y - level) / course, score.rows, plainly)
         fit, problem = joint.best.fit, joint.problem
-        if not joint.related or fit.cost >= hopeless:
-            return None
         data, constant = _undivided(joint, score.rows, y)
-        rates = _SETTLES if turn == 0 and begin.rate else (score.rate,)
+        rates = (score.rate,)
         for _ in range(2 if begin.rate else 1):
             again = scored(data, constant, data.counted, rates=rates)
-            if not again:
-                return None
-            score = max(again, key=lambda one: one.gain)
+            score = max(again, key=lambda one: one.gain, default=score)
             rates = tuple(score.rate * spread ** np.linspace(-1.0, 1.0, _FINELY))
         # Compared with the residual of the undivided output, whose noise is even.
         even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
         whole = replace(joint, best=even)
         gained = criterion_gain(whole, len(score.rows), first.best.fit, first.problem)
-        if plainly and gained < -2 * CLEARLY / PART:
-            break  # further rounds change only a part of it
         spread **= 2.0 / (_FINELY - 1)
     return _Settled(
         joint=joint,

@@ -78,10 +78,6 @@ def detect_hold(y: Real, fs: float, prediction: Real | None = None) -> Hold | No
     period = _coarse_period(changed, runs, shortest)
     if period is None:
         return None
-    if shortest == 1 and (
-        change.min() > 0 or changed.size * period < NEARLY * (changed[-1] - changed[0])
-    ):
-        return None
     return _bounded(changed.astype(np.float64), period, fs)
 
 
@@ -141,12 +137,10 @@ def _coarse_period(
         power = np.array([np.abs(np.exp(2j * np.pi * c / t).mean()) for t in trial])
         best = float(trial[np.argmax(power)])
         expected = best / np.pi * np.sin(np.pi / best)
-        if best < 1 + FEW or power.max() < NEARLY * expected:
+        if power.max() < NEARLY * expected:
             return None
         if count >= changed.size - stretch:
-            if stretch == 0:
-                return best
-            stretch = 0
+            return best
         low, high = max(best - 3 * finest, 1 + FEW), best + 3 * finest
         count = min(2 * count, changed.size - stretch)
 
@@ -154,40 +148,29 @@ def _coarse_period(
 def _bounded(changed: Real, period: float, fs: float) -> Hold | None:
     """Bound period and phase by all changes; return the middle of the bounds."""
     k, period = _numbered(changed, period)
-    allowed = int(FEW * changed.size)
-    for _ in range(allowed + 1):
-        interval = _feasible(k, changed, period)
-        if interval is not None:
-            low, high = interval
-            middle = 0.5 * (low + high)
-            bounds = [_phase(k, changed, t) for t in np.linspace(low, high, 21)]
-            first = 0.5 * sum(_phase(k, changed, middle))
-            lowest, highest = min(b[0] for b in bounds), max(b[1] for b in bounds)
-            back = np.floor(first / middle + _ROUNDING)  # to the first update in the record
-            return Hold(
-                period=middle / fs,
-                phase=float(first - back * middle) / fs,
-                std=float((high - low + 2e-9) / np.sqrt(12.0) / fs),
-                phase_std=float(max(highest - first, first - lowest) / np.sqrt(3.0) / fs),
-            )
-        off = changed - k * period
-        worst = int(np.argmax(np.abs(off - np.median(off))))
-        k, changed = np.delete(k, worst), np.delete(changed, worst)
-    return None
+    interval = _feasible(k, changed, period)
+    if interval is None:
+        return None
+    low, high = interval
+    middle = 0.5 * (low + high)
+    bounds = [_phase(k, changed, t) for t in np.linspace(low, high, 21)]
+    first = 0.5 * sum(_phase(k, changed, middle))
+    lowest, highest = min(b[0] for b in bounds), max(b[1] for b in bounds)
+    back = np.floor(first / middle + _ROUNDING)  # to the first update in the record
+    return Hold(
+        period=middle / fs,
+        phase=float(first - back * middle) / fs,
+        std=float((high - low + 2e-9) / np.sqrt(12.0) / fs),
+        phase_std=float(max(highest - first, first - lowest) / np.sqrt(3.0) / fs),
+    )
 
 
 def _numbered(changed: Real, period: float) -> tuple[Real, float]:
     """Number of the update at each change, and the period by least squares."""
     phase = np.angle(np.mean(np.exp(2j * np.pi * changed / period))) * period / (2 * np.pi)
     k = np.rint((changed - phase) / period)
-    for _ in range(5):
-        centred = k - k.mean()
-        period = float(centred @ changed / (centred @ centred))
-        moved = np.rint((changed - np.mean(changed - period * k)) / period)
-        if np.array_equal(moved, k):
-            break
-        k = moved
-    return k, period
+    centred = k - k.mean()
+    return k, float(centred @ changed / (centred @ centred))
 
 
 def _phase(k: Real, changed: Real, period: float) -> tuple[float, float]:

@@ -17,16 +17,13 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.colour import line_of
-from hmpim.identify.worth import MOST, ROUNDING
+from hmpim.identify.worth import ROUNDING
 from hmpim.record import Finding
 
 __all__ = ["Humming", "hum_finding", "line_near", "with_hum"]
 
 _MOST = 8
 """Most lines that are looked for: the mains and its harmonics."""
-
-_AT_HALF = 0.01
-"""Distance from half the sampling rate, in bins, within which a line is at it and has no sine."""
 
 _ROWS = 3
 """Rows for each line."""
@@ -51,12 +48,11 @@ def with_hum(first: JointFit, fitted: Callable[[Real, bool], JointFit]) -> Hummi
     lines. `fitted` makes the joint fit with rows for the lines, of plain structures only if its
     second argument is true.
     """
-    frequencies, share = _lines(first)
+    frequencies = _lines(first)
     if not frequencies:
         return None
     rows = np.vstack([_rows_of(first, one) for one in frequencies])
-    # Lines that are the smaller part of the residual did not hide dynamics.
-    joint = fitted(rows, share < MOST and first.best.fit.structure.name in PLAIN)
+    joint = fitted(rows, first.best.fit.structure.name in PLAIN)
     if criterion_gain(joint, rows.shape[0], first.best.fit, first.problem) < 0.0:
         return None
     parts = joint.best.fit.nuisance.reshape(-1, _ROWS)
@@ -88,15 +84,15 @@ def hum_finding(humming: Humming, fs: float, unit: str) -> Finding:
     )
 
 
-def _lines(joint: JointFit) -> tuple[list[float], float]:
-    """Frequencies of the residual's lines, in cycles per sample, and their share of its power."""
+def _lines(joint: JointFit) -> list[float]:
+    """Frequencies of the residual's lines, in cycles per sample."""
     residual, valid = joint.best.fit.residual, joint.problem.valid
     weight = np.ones(residual.size) if valid is None else valid.astype(np.float64)
     rest = np.where(weight > 0.0, residual - residual[weight > 0.0].mean(), 0.0)
     found: list[float] = []
-    whole, motion = float(rest @ rest), joint.problem.y - joint.problem.y.mean()
-    if whole <= ROUNDING**2 * float(motion @ motion):
-        return found, 0.0  # rounding errors have a period of their own
+    motion = joint.problem.y - joint.problem.y.mean()
+    if float(rest @ rest) <= ROUNDING**2 * float(motion @ motion):
+        return found  # rounding errors have a period of their own
     while len(found) < _MOST:
         line = line_of(rest, 1.0)
         if line is None:
@@ -105,7 +101,7 @@ def _lines(joint: JointFit) -> tuple[list[float], float]:
         phase = 2 * np.pi * found[-1] * np.arange(rest.size)
         rows = np.stack([np.cos(phase), np.sin(phase)]) * weight
         rest = rest - solved(rows @ rows.T, rows @ rest) @ rows
-    return found, 1.0 - float(rest @ rest) / whole if found else 0.0
+    return found
 
 
 def line_near(residual: Real, line: float) -> float:
@@ -122,8 +118,7 @@ def line_near(residual: Real, line: float) -> float:
         method="bounded",
         options={"xatol": 1e-5 / size},
     )
-    near = float(best.x)
-    return 0.5 if 0.5 - near < _AT_HALF / size else near
+    return float(best.x)
 
 
 def _rows_of(joint: JointFit, frequency: float) -> Real:
@@ -131,8 +126,7 @@ def _rows_of(joint: JointFit, frequency: float) -> Real:
     residual = joint.best.fit.residual
     at = np.arange(residual.size) - residual.size // 2
     phase = 2 * np.pi * frequency * at
-    sine = np.sin(phase) if frequency < 0.5 else np.zeros_like(phase)
-    pair = np.stack([np.cos(phase), sine])
+    pair = np.stack([np.cos(phase), np.sin(phase)])
     valid = joint.problem.valid
     counted = pair if valid is None else pair * valid
     a, b = solved(counted @ counted.T, counted @ residual)

@@ -25,7 +25,6 @@ from hmpim.identify.effects.lost_samples import (
 from hmpim.identify.effects.quantization import Quantization, detect_quantization
 from hmpim.identify.effects.saturation import Saturation, detect_saturation
 from hmpim.identify.fitting.data import prepared
-from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of
 from hmpim.identify.worth import FEW, NEARLY, ROUNDING, TWICE
@@ -36,9 +35,6 @@ __all__ = ["Imperfections", "find_imperfections", "refine"]
 
 _FEWEST_LEVELS = 8
 """Fewest different values of an output, unless its input takes as few."""
-
-_HEAD = 64
-"""First samples, in which most outputs already take more values: a quick test."""
 
 _ROUNDS = 3
 """Searches for spikes after the censored fit: large ones hide smaller ones."""
@@ -54,13 +50,11 @@ class Imperfections:
     spikes: Mask | None = None
     frozen: Mask | None = None
     repeated: Mask | None = None
-    unsure: Mask | None = None  # may be copies of samples that are lost
     levels: int | None = None
 
     def counts_other_samples_than(self, before: "Imperfections") -> bool:
-        """Whether a clipped side or a hold appeared or vanished, or more samples are lost."""
-        sides_differ = _sides(self.saturation) != _sides(before.saturation)
-        if sides_differ or (self.hold is None) != (before.hold is None):
+        """Whether a clipped side appeared or vanished, or more samples are lost."""
+        if _sides(self.saturation) != _sides(before.saturation):
             return True
         lost, known = self.lost, before.lost
         return lost is not None and bool(np.any(lost if known is None else lost & ~known))
@@ -68,8 +62,7 @@ class Imperfections:
     @property
     def lost(self) -> Mask | None:
         """Samples without information: spikes, copies, and standstills."""
-        every = (self.spikes, self.frozen, self.repeated, self.unsure)
-        masks = [mask for mask in every if mask is not None]
+        masks = [mask for mask in (self.spikes, self.frozen, self.repeated) if mask is not None]
         return np.logical_or.reduce(masks) if masks else None
 
     @property
@@ -120,25 +113,23 @@ def find_imperfections(
     """Look for saturation, hold, rounding, spikes and standstills in an output, (n,).
 
     Samples that are not `valid` were filled in, and lie on no grid. The prediction of a first model
-    distinguishes a plateau from a crest, and shows spikes and standstills. `inputs` show whether
+    shows saturation, spikes and standstills. `inputs` show whether
     the output takes too few values, or stands still to its end; without them, neither is tested.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step
-    levels = detect_saturation(y, prediction, step=step)
-    clipping = levels if any(_sides(levels)) and levels.share <= NEARLY else None
     hold = detect_hold(y, fs, prediction)
-    spikes = frozen = None
-    if hold is None and prediction is None:
+    clipping = spikes = frozen = None
+    if prediction is not None:
+        levels = detect_saturation(y, prediction, step=step)
+        clipping = levels if any(_sides(levels)) and levels.share <= NEARLY else None
+    if prediction is None and hold is None:
         frozen = find_stuck(y, inputs)
-    elif hold is None and prediction is not None:
+    elif prediction is not None and hold is None:
         frozen = find_frozen(y, prediction, step=step)
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
     repeated = find_repeated(y) if rounding is None and hold is None else None
-    unsure = None
-    if repeated is not None and valid is not None:  # a sample after a gap may be a copy
-        unsure = np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
     return Imperfections(
         saturation=clipping,
         hold=hold,
@@ -146,7 +137,6 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=repeated,
-        unsure=unsure,
         levels=_few_levels(y, inputs),
     )
 
@@ -160,7 +150,7 @@ def _sides(saturation: Saturation | None) -> tuple[bool, bool]:
 
 def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
     """Number of values of the output, if it is small compared with the inputs'."""
-    if not inputs or np.unique(y[:_HEAD]).size >= _FEWEST_LEVELS:
+    if not inputs:
         return None
     levels = np.unique(y).size
     few = levels < _FEWEST_LEVELS and max(np.unique(u).size for u in inputs) > 2 * levels
@@ -178,8 +168,8 @@ def refine(
     if found.saturation is None and found.hold is None:
         return None
     problem = joint.problem
-    whole = None if problem.valid is None else _gaps_only(problem.valid, found, fs)
-    if problem.begins is not None and whole is not None:  # until the initial state has decayed
+    whole = _gaps_only(problem, found, fs)
+    if problem.begins is not None:  # until the initial state has decayed
         memory = int(np.ceil(joint.best.fit.memory))
         whole[: problem.begins + min(memory, problem.y.size // 4)] = False
     arrivals = found.arrivals(problem.y.size, fs)
@@ -189,7 +179,7 @@ def refine(
             return problem
         return replace(problem, source=prepared(u, mode, rest=problem.begins is None))
 
-    def censored_fit(mode: Intersample, start: Fit, counts: Mask | None) -> CensoredFit:
+    def censored_fit(mode: Intersample, start: Fit, counts: Mask) -> CensoredFit:
         read = replace(assuming(mode), valid=counts, nuisance=None, begins=None)
         return fit_censored(read, start, found.saturation, arrivals=arrivals, drift=disturbance)
 
@@ -209,7 +199,7 @@ def refine(
         spikes = _spikes(censored, found.saturation)
         if spikes is None:
             break
-        whole = ~spikes if whole is None else np.asarray(whole & ~spikes)
+        whole = np.asarray(whole & ~spikes)
         censored = censored_fit(chosen.intersample, censored.fit, whole)
     counted = np.zeros(problem.y.size, dtype=bool)
     counted[censored.index] = True
@@ -237,7 +227,7 @@ def _weighed_again(
     moved = {
         trial.intersample: again[_kind(trial)].criterion - trial.criterion
         for trial in joint.trials
-        if _kind(trial) in again and trial.fit.structure == joint.best.fit.structure
+        if _kind(trial) in again
     }
     usual = moved.get(joint.best.intersample, 0.0)
     return tuple(
@@ -271,7 +261,7 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
     """The chosen trial, and those that clipping may have made look worse.
 
     Samples inside the range are a biased selection: noise that would have led out of it is missing.
-    The first fit may explain that by a richer structure, or another assumption between the samples.
+    The first fit may explain that by another assumption between the samples.
     """
     best = joint.best
     if found.saturation is None:
@@ -283,18 +273,13 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
         and trial.fit.structure == best.fit.structure
         and trial.fit.objective < TWICE * best.fit.objective
     ]
-    simpler = [
-        trial
-        for trial in joint.trials
-        if trial.intersample == best.intersample
-        and trial.fit.structure.name in PLAIN
-        and best.fit.structure.name not in PLAIN
-    ]
-    return [best, *simpler, *between]
+    return [best, *between]
 
 
-def _gaps_only(valid: Mask, found: Imperfections, fs: float) -> Mask:
+def _gaps_only(problem: Problem, found: Imperfections, fs: float) -> Mask:
     """Samples that count, with clipped and held ones included again."""
-    shown, lost = found.informative(valid.size, fs), found.lost
-    whole = valid if shown is None else np.asarray(valid | ~shown)
+    whole = np.ones(problem.y.size, dtype=bool)
+    shown, lost = found.informative(problem.y.size, fs), found.lost
+    if problem.valid is not None and shown is not None:
+        whole = np.asarray(problem.valid | ~shown)
     return whole if lost is None else np.asarray(whole & ~lost)

@@ -1,10 +1,7 @@
 """Levels at which a signal was clipped, and the samples at them.
 
-A clipped signal spends far more time at its extreme than just below it, and reaches it at
-speed. A sinusoid's crest, a settled step or a square wave does not: at a crest the density
-of the values rises as one over the root of the distance, at a settling step as one over the
-distance, and a square wave has no values below its extreme at all. With a prediction, the
-question is simpler: does the prediction exceed the level?
+A clipped signal spends far more time at its extreme than just below it. So does a settled step or
+a square wave; but only if it was clipped does a model's prediction exceed the level.
 """
 
 from dataclasses import dataclass, replace
@@ -12,25 +9,20 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from hmpim.identify.arrays import Mask, Real, every_of, median
 from hmpim.identify.chance import BULK, FALSE_ALARM, ONE_SIDED
 from hmpim.identify.effects.smeared import Side, corrections, smeared_plateaus
-from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, ROUNDING, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, ROUNDING
 
 __all__ = ["Saturation", "detect_saturation", "goes_beyond"]
-
 
 _CROWDED = 3.5
 """Samples at a flattened crest, as of sin x + (1/9) sin 3x, over those expected from just below;
 a sinusoid's gives 2.4 to 3."""
 
 _FEWEST = 8
-"""Fewest samples at the level, and just below it."""
-
-_VISITS = 2
-"""Fewest stays at the level that must look alike, without a prediction."""
+"""Fewest samples at the level."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,29 +54,26 @@ class Saturation:
         return float(np.mean(self.clipped))
 
 
-def detect_saturation(y: Real, prediction: Real | None = None, *, step: float = 0.0) -> Saturation:
+def detect_saturation(y: Real, prediction: Real, *, step: float = 0.0) -> Saturation:
     """Find the levels at which `y`, (n,), was clipped; None where there is no clipping.
 
     The prediction is that of a linear model, (n,). It need not be good: its gain and timing are
-    corrected on the samples that are not at the level. It distinguishes a short plateau from a
-    crest, and a clipped wave from a square one. `step` is that to which `y` is rounded, in its
-    unit; 0 for none (see `detect_quantization`).
+    corrected on the samples that are not at the level. `step` is that to which `y` is rounded, in
+    its unit; 0 for none (see `detect_quantization`).
     """
     scatter = _scatter(y)
     high = _upper(y, prediction, step, scatter)
-    low = _upper(-y, None if prediction is None else -prediction, step, scatter)
+    low = _upper(-y, -prediction, step, scatter)
     if low is not None:
         low = replace(low, level=-low.level)
-    if high is None and low is None and prediction is not None:  # noise may hide the plateau
+    if high is None and low is None:  # noise may hide the plateau
         low, high = smeared_plateaus(y, prediction, step=step)
     return Saturation(low=low, high=high, tolerance=0.5 * step)
 
 
-def _upper(y: Real, prediction: Real | None, step: float, scatter: float) -> Side | None:
+def _upper(y: Real, prediction: Real, step: float, scatter: float) -> Side | None:
     """The upper level of equal values; None where there is none."""
     span = float(np.ptp(y))
-    if span == 0.0:
-        return None
     side = _exact(y, span, step)
     clipped = side is not None and _is_clipped(y, side, prediction, step, span, scatter)
     return side if clipped else None
@@ -115,21 +104,17 @@ def _exact(y: Real, span: float, step: float) -> Side | None:
 
 
 def _is_clipped(
-    y: Real, side: Side, prediction: Real | None, step: float, span: float, scatter: float
+    y: Real, side: Side, prediction: Real, step: float, span: float, scatter: float
 ) -> bool:
-    """Whether a level is one of clipping, by the values near it or by the prediction."""
+    """Whether a level is one of clipping, by the values near it and by the prediction."""
     # The level covers half a step on either side.
     resolution = 2.0 * max(float(side.level - y[side.at].min()), 0.5 * step, 1e-9 * span)
     distance = side.level - y[~side.at]
     reach = resolution + MUCH * span
     below = distance[(distance >= 0) & (distance < reach)]
     count = int(np.count_nonzero(side.at))
-    if not _is_crowded(count, below, resolution):
-        return False
-    if prediction is not None:
-        return _is_confirmed(y, side, prediction, resolution, scatter)
-    even = below.size >= _FEWEST and _is_even(below, resolution, reach)
-    return even and _is_flat(y, side, resolution, reach)
+    crowded = _is_crowded(count, below, resolution)
+    return crowded and _is_confirmed(y, side, prediction, resolution, scatter)
 
 
 def _is_crowded(count: int, below: Real, resolution: float) -> bool:
@@ -143,52 +128,14 @@ def _is_crowded(count: int, below: Real, resolution: float) -> bool:
     return bool(scipy.special.pdtrc(count - 1, _CROWDED * expected) < FALSE_ALARM)
 
 
-def _is_even(below: Real, resolution: float, reach: float) -> bool:
-    """Whether the density of the values below the level does not rise towards it."""
-    floor = max(resolution, reach / 100.0)
-    inside = np.maximum(below, floor) - floor + reach / 100.0
-    exponent = 1.0 - inside.size / float(np.sum(np.log((reach - floor) * 1.01 / inside)))
-    # The exponent is 0 if clipped, 1/2 at a crest, 1 if settling.
-    return bool(exponent < NEARLY * 0.5)
-
-
-def _visits(at: Mask) -> NDArray[np.intp]:
-    """First and last sample of each stay at the level, shape (m, 2); ignores short breaks."""
-    where = np.flatnonzero(at)
-    breaks = np.flatnonzero(np.diff(where) > 3)
-    first = where[np.concatenate([[0], breaks + 1])]
-    last = where[np.concatenate([breaks, [where.size - 1]])]
-    inside = (first > 2) & (last < at.size - 3) & (last - first >= 2)
-    return np.stack([first[inside], last[inside]], axis=1)
-
-
-def _is_flat(y: Real, side: Side, resolution: float, reach: float) -> bool:
-    """Whether the level is reached and left at speed, alike on both sides."""
-    visits = _visits(side.at)
-    if visits.shape[0] < _VISITS:
-        return False
-    distance = side.level - y
-    near = distance < reach
-    coming, leaving = [], []
-    for first, last in visits:
-        length = last - first + 1
-        before = near[max(first - length, 0) : first][::-1]
-        after = near[last + 1 : last + 1 + length]
-        coming.append(before.size if before.all() else int(np.argmin(before)))
-        leaving.append(after.size if after.all() else int(np.argmin(after)))
-    if min(np.median(coming), np.median(leaving)) < 2.0:  # a jump, as of a square wave
-        return False
-    return bool(1.0 / TWICE < sum(coming) / sum(leaving) < TWICE)
-
-
 def goes_beyond(found: Saturation, y: Real, prediction: Real) -> bool:
-    """Whether a prediction, (n,), exceeds a clipping level of `y` that was found without it.
+    """Whether a prediction, (n,), exceeds a clipping level of `y` that was found with another.
 
     Examples
     --------
     >>> wave = np.sin(np.arange(1000) / 50)
     >>> y = np.clip(wave, -2.0, 0.8)
-    >>> found = detect_saturation(y)
+    >>> found = detect_saturation(y, wave)
     >>> goes_beyond(found, y, wave), goes_beyond(found, y, y)
     (True, False)
     """

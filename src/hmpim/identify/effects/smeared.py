@@ -65,9 +65,9 @@ def smeared_plateaus(
     every = 1 + y.size // _MOST  # some samples of a long record are enough
     rows, prediction, y = everything[:, ::every], prediction[::every], y[::every]
     sides = _falls_short(y, rows)
-    best = _best_split(y, rows, sides) if any(sides) else None
-    if best is None:
+    if not any(sides):
         return None, None
+    best = _best_split(y, rows, sides)
     # Slow noise also bends the output: fewer of its samples are independent.
     model = np.clip(best.unclipped, best.low, best.high)
     variance = best.cost / y.size / effective_share(y - model)
@@ -81,12 +81,6 @@ def smeared_plateaus(
         and _holds(y, rows, best, clipped, others, variance)
         for clipped, others in ((best.below, (False, sides[1])), (best.above, (sides[0], False)))
     )
-    if not any(kept):
-        return None, None
-    if kept != (bool(best.below.any()), bool(best.above.any())):
-        best = _best_split(y, rows, (kept[0], kept[1]))
-        if best is None:
-            return None, None
     sigma, unclipped = float(np.sqrt(variance)), best.weights @ everything
 
     def side(level: float, clipped: Mask, at: Mask) -> Side:
@@ -127,23 +121,21 @@ def _falls_short(y: Real, rows: Real) -> tuple[bool, bool]:
     return found[0], found[1]
 
 
-def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split | None:
-    """The best clipped fit from all starts; None if there is none."""
+def _best_split(y: Real, rows: Real, sides: tuple[bool, bool]) -> _Split:
+    """The best clipped fit from all starts."""
     found = []
     for quantile in _STARTS:
         low, high = np.quantile(rows[1], [1.0 - quantile, quantile])
         found.append(_settled(y, rows, low if sides[0] else -np.inf, high if sides[1] else np.inf))
-    return min((one for one in found if one), key=lambda one: one.cost, default=None)
+    return min(found, key=lambda one: one.cost)
 
 
-def _settled(y: Real, rows: Real, low: float, high: float) -> _Split | None:
+def _settled(y: Real, rows: Real, low: float, high: float) -> _Split:
     """Fit levels and correction in turn, until the clipped samples stay the same."""
     q, weights = rows[1], np.zeros(rows.shape[0])
     below, above = q < low, q > high
     for _ in range(30):
         free = ~(below | above)
-        if np.count_nonzero(free) < max(4 * rows.shape[0], FEW * y.size):
-            return None
         used = rows[:, free]
         weights = solved(used @ used.T, used @ y[free])
         q = weights @ rows
@@ -171,8 +163,7 @@ def _holds(
     centred = q - q.mean()
     slope = float(centred @ y[clipped]) / float(centred @ centred)
     error = float(np.sqrt(variance / (centred @ centred)))
-    if slope > MUCH + 2 * error or error > 0.5:
+    if slope > MUCH + 2 * error:
         return False
-    without = _best_split(y, rows, others) if any(others) else None
-    cost = _cost(y, rows) if without is None else without.cost
+    cost = _best_split(y, rows, others).cost if any(others) else _cost(y, rows)
     return cost - best.cost > 2 * SEARCHED * variance

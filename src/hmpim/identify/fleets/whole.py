@@ -26,8 +26,8 @@ from hmpim.identify.judgement.structure import barely_distinguished
 from hmpim.identify.judgement.verdict import judged
 from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.nonlinear.bends import bends, bent_shapes
-from hmpim.identify.nonlinear.lines import find_period
 from hmpim.identify.nonlinear.mechanisms import LONGEST
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of

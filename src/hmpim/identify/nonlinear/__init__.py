@@ -4,7 +4,7 @@ nonlinearity          the inspection of one fit, and its summary
 harmonics             even and odd harmonics that follow a sweep
 sweep_phase           the phase of a sweep, from its samples
 harmonic_regression   the regression on these harmonics
-lines                 distortion at the unexcited lines of a periodic input
+period                the period of an input that repeats
 mechanisms            friction, backlash, rate limit, hard and soft springs
 evidence              which of them the record supports
 bends                 how far a nonlinearity moves a linear fit

@@ -17,12 +17,10 @@ import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import CLEARLY, HALF, searched
-from hmpim.identify.fitting.data import polished
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
-from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.autoregression import yule_walker
 from hmpim.identify.noise.whiteness import is_white
@@ -40,7 +38,7 @@ from hmpim.model.poles import rational_response
 from hmpim.model.sampled import SampledInput, prepare_input
 from hmpim.record import Intersample
 
-__all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead", "plainer_bends"]
+__all__ = ["Bend", "bends", "bent_shapes", "is_bent_instead"]
 
 _EVERY = 3
 """Every third of a kind's values is tried: neighbouring values leave very similar traces."""
@@ -158,28 +156,6 @@ def is_bent_instead(
         return False
     own = bends(u, problem, fit, intersample=intersample, floor=floor)
     return bent[0].gain > gained + (own[0].gain if own else 0.0)
-
-
-def plainer_bends(
-    u: Real, joint: JointFit, plain: Fit | None, *, floor: float = 0.0
-) -> tuple[Bend, ...]:
-    """Find the kinds that make a plain fit about as likely as the rich one chosen.
-
-    Both fit the same data; without a plain fit nothing is found.
-    """
-    best, problem = joint.best, joint.weighed
-    if plain is None or plain.structure.parameters >= best.fit.structure.parameters:
-        return ()
-    plain = polished(problem, plain)
-    if best.fit.objective < PART * plain.objective:  # no kind explains as much
-        return ()
-    count = problem.counted * joint.weighed_share
-    fewer = best.fit.structure.parameters - plain.structure.parameters - 1
-    behind = count * np.log(plain.objective / best.fit.objective) - fewer * np.log(count)
-    found = bends(u, problem, plain, intersample=best.intersample, floor=floor)
-    return tuple(
-        replace(bend, white=False) for bend in found if behind - 2.0 * bend.gain < 2.0 * CLEARLY
-    )
 
 
 def bent_shapes(u: Real, problem: Problem, fit: Fit, *, intersample: Intersample) -> Real:

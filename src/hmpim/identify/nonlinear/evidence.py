@@ -1,8 +1,8 @@
-"""What a sweep's harmonics, unexcited lines, or traces show about one linear fit.
+"""What a sweep's harmonics, or traces, show about one linear fit.
 
-The evidence comes first: harmonics above the noise, output at lines that the input does not excite,
-traces that gain likelihood. Then come the kinds that remain possible, and the question whether a
-plainer linear structure with one kind explains more than a rich one alone.
+The evidence comes first: harmonics above the noise, or traces that gain likelihood. Then come the
+kinds that remain possible, and the question whether a plainer linear structure with one kind
+explains more than a rich one alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.harmonics import Harmonics, any_harmonics, sweep_harmonics
-from hmpim.identify.nonlinear.lines import LineLevel, detection_lines, find_period
 from hmpim.identify.nonlinear.mechanisms import Mechanism, compare_harmonics, compare_mechanisms
+from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
 from hmpim.identify.worth import MOST, MUCH, PART, TOLERATED
 
@@ -47,7 +47,6 @@ class Outcome:
 
     fit: Fit
     harmonics: Harmonics | None = None
-    lines: tuple[LineLevel, ...] = ()
     mechanisms: tuple[Mechanism, ...] = ()  # the likeliest first
     named: tuple[Mechanism, ...] = ()  # those of them that remain possible
     rms: float = 0.0  # of the nonlinear part, in the output's unit
@@ -73,11 +72,7 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
     """Measure the harmonics of a sweep, and find the kinds that may make them."""
     residual = thinned(fit.residual, subject.block)
     rate, delay = subject.fs / subject.block, fit.delay / subject.fs
-    if (
-        white
-        and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM
-        and not _curved(fit, subject.problem)
-    ):
+    if white and any_harmonics(residual[None], sweep, rate, delay=delay)[0] > FALSE_ALARM:
         return Outcome(fit=fit)
     phases = [sweep_phase(thinned(other, subject.block), rate) for other in subject.others]
     others = [phase for phase in phases if phase is not None]
@@ -91,7 +86,7 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
     parts = [harmonics.rms(p) for p in (0, 1) if harmonics.probability(p) < FALSE_ALARM]
     kinds: tuple[Mechanism, ...] = ()
     significant = bool(parts) or harmonics.regression.evidence > LIKELIER
-    if significant and not subject.others and np.ptp(fit.prediction) > 0:
+    if significant and not subject.others:
         model = thinned(fit.prediction - fit.linear[-1], subject.block)
         denominator = fit.denominator / float(subject.block) ** np.arange(fit.denominator.size)
         kinds = compare_harmonics(harmonics.regression, model, denominator, fs=rate)
@@ -103,29 +98,16 @@ def _by_harmonics(subject: Subject, sweep: SweepPhase, fit: Fit, white: bool) ->
 
 
 def _by_traces(subject: Subject, fit: Fit, white: bool) -> Outcome:
-    """Test unexcited lines, if the input repeats, and whether any kind explains the residual."""
-    u, problem = subject.u, subject.problem
-    period = find_period(u)
-    lines: tuple[LineLevel, ...] = ()
-    if period is not None and problem.valid is None and u.size >= 3 * period:
-        lines = detection_lines(u[period:], problem.y[period:], period=period)  # after transients
-    levels = [v for v in lines if v.probability < FALSE_ALARM]
-    if white and not levels and not _curved(fit, problem):
-        return Outcome(fit=fit, lines=lines)
-    power = fit.cost / max(problem.counted, 1)
-    least = 0.0
-    if not white:  # missing dynamics resemble every kind a little, more so with few lines
-        least = power * (PART if period is None else MOST)
-    kinds = compare_mechanisms(problem, fit, fs=subject.fs)
+    """Test whether any kind explains the residual."""
+    if white:
+        return Outcome(fit=fit)
+    # Missing dynamics resemble every kind a little, more so with few lines.
+    share = PART if find_period(subject.u) is None else MOST
+    least = share * fit.cost / max(subject.problem.counted, 1)
+    kinds = compare_mechanisms(subject.problem, fit, fs=subject.fs)
     found = tuple(m for m in kinds if m.gain > _GAIN and m.rms**2 > least)
-    distortion = float(np.sqrt(sum(0.5 * v.lines * v.rms**2 for v in levels)))
-    return Outcome(
-        fit=fit,
-        lines=lines,
-        mechanisms=found,
-        named=_likely(found, 0.0),
-        rms=max(distortion, found[0].rms if found else 0.0),
-    )
+    rms = found[0].rms if found else 0.0
+    return Outcome(fit=fit, mechanisms=found, named=_likely(found, 0.0), rms=rms)
 
 
 def _likely(kinds: tuple[Mechanism, ...], evidence: float) -> tuple[Mechanism, ...]:
@@ -148,26 +130,17 @@ def criterion_of(subject: Subject, outcome: Outcome) -> float:
     e = thinned(outcome.fit.residual, subject.block)
     unknown, cost = outcome.fit.structure.parameters, float(e @ e)
     if outcome.named and outcome.named[0].trace.size == e.size:
-        trace = outcome.named[0].trace
-        if subject.problem.valid is not None:
-            trace = trace * thinned(subject.problem.valid.astype(np.float64), subject.block)
         rows = [thinned(row, subject.block) for row in jacobian(subject.problem, outcome.fit)]
-        basis = np.linalg.qr(np.stack([*rows, trace]).T)[0]
+        basis = np.linalg.qr(np.stack([*rows, outcome.named[0].trace]).T)[0]
         cost -= float(np.sum((basis.T @ e) ** 2))
         unknown += 1
     return e.size * float(np.log(max(cost, np.finfo(float).tiny))) + unknown * float(np.log(e.size))
 
 
-def _curved(fit: Fit, problem: Problem) -> bool:
-    """Whether a white residual follows the square, cube or direction of its model's output."""
-    x = fit.prediction - fit.linear[-1]
-    return bool(are_curved(x[None], fit.residual[None], problem.valid)[0])
-
-
-def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Mask:
+def are_curved(models: Real, residuals: Real) -> Mask:
     """Which white residuals, (k, n), follow the square, cube or direction of their models' output.
 
-    `models` holds the outputs of the linear models, without bias; all samples count, or `counted`.
+    `models` holds the outputs of the linear models, without bias.
     """
     size = np.std(models, axis=1)
     moving = size > 0
@@ -180,7 +153,6 @@ def are_curved(models: Real, residuals: Real, counted: Mask | None = None) -> Ma
         step = np.gradient(near, axis=1)[:, before : before + x.shape[1]]
         cube, direction = x * x * x / size, np.sign(step) * size
         rows = np.stack([np.ones_like(x), x, step, x**2, cube, direction, e], axis=1)
-        rows = rows if counted is None else rows[:, :, counted[here]]
         gram += rows @ rows.transpose(0, 2, 1)
     count, power = gram[:, 0, 0], gram[:, 6, 6]
     scale = np.sqrt(np.einsum("kii->ki", gram[:, :6, :6]))

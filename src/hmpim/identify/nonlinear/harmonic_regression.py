@@ -88,10 +88,9 @@ def columns_of(view: SweepView, others: Sequence[Real] = ()) -> Real:
     row = 0
     for k in range(1, max(view.orders) + 1):
         power = power * turn
-        if k == 1 or k in view.orders:
-            below = k * view.rate < 0.5 * HIGHEST
-            out[row], out[row + 1] = power.real * below, power.imag * below
-            row += 2
+        below = k * view.rate < 0.5 * HIGHEST
+        out[row], out[row + 1] = power.real * below, power.imag * below
+        row += 2
     out[row] = 1.0
     for phase in others:
         out[row + 1], out[row + 2] = np.cos(phase), np.sin(phase)

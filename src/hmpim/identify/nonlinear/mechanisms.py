@@ -245,9 +245,7 @@ def _fitted(hypothesis: Hypothesis, e: Real, background: Real, counted: Mask) ->
     """Fit a hypothesis by generalised least squares, with the noise colour of a first residual."""
     h = hypothesis.trace * counted
     alone = h - (background @ h) @ background
-    power = float(alone @ alone)
-    if power <= 1e-10 * float(h @ h):
-        return None
+    power = max(float(alone @ alone), np.finfo(float).tiny)
     weight = max(float(alone @ e) / power, 0.0)
     residual = e - (background @ e) @ background - weight * alone
     colour, _ = yule_walker(residual[counted], LONGEST_AUTOREGRESSION)

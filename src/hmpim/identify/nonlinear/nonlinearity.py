@@ -1,7 +1,7 @@
 """Whether the system is linear, and if not, in which way and by how much.
 
-A sweep shows a nonlinearity by its harmonics, a multisine by output at its unexcited lines, any
-other input by how much better a nonlinear trace explains the residual. If there is one,
+A sweep shows a nonlinearity by its harmonics, any other input by how much better a nonlinear trace
+explains the residual. If there is one,
 `hmpim.identify.nonlinear.mechanisms` determines its kind. Dependence on the amplitude takes several
 records: `hmpim.identify.records.levels`.
 """
@@ -101,21 +101,14 @@ def _shares(outcome: Outcome, power: float) -> dict[str, float]:
 
 
 def _where(outcome: Outcome, output: float) -> list[str]:
-    """Harmonics, lines or symmetry in words."""
-    where = []
-    if outcome.harmonics is not None:
-        where = [
-            f"{percent(outcome.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
-            for name, parity in (("odd", 1), ("even", 0))
-            if outcome.harmonics.probability(parity) < FALSE_ALARM
-        ]
-    elif outcome.mechanisms:
+    """Harmonics or symmetry in words."""
+    if outcome.harmonics is None:
         even = outcome.mechanisms[0].kind == "asymmetry"
-        where = [f"{'even' if even else 'odd'} in the deflection"]
-    return where + [
-        f"{percent(level.share)} % at {level.parity} lines left out"
-        for level in outcome.lines
-        if level.probability < FALSE_ALARM
+        return [f"{'even' if even else 'odd'} in the deflection"]
+    return [
+        f"{percent(outcome.harmonics.rms(parity) / output)} % in {name} harmonics of the sweep"
+        for name, parity in (("odd", 1), ("even", 0))
+        if outcome.harmonics.probability(parity) < FALSE_ALARM
     ]
 
 

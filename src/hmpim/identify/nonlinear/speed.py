@@ -28,7 +28,7 @@ from hmpim.model.fine import FINE, finely, sampled
 from hmpim.model.nonlinear import NonlinearPart
 from hmpim.model.operators import rate_limited
 from hmpim.model.sampled import prepare_input
-from hmpim.record import Finding, Intersample
+from hmpim.record import Finding
 
 __all__ = ["LimitedCommand", "limited_command", "speed_finding", "with_free_speed"]
 
@@ -46,7 +46,6 @@ class LimitedCommand:
     values: Real  # (n,): what the unit follows, at the samples
     recorded: Real  # (n,): the command
     slope: Real  # (n,): partial derivative of the output by the speed, up to a factor
-    between: Intersample  # what the command does between its samples
 
     def part(self, fs: float) -> NonlinearPart:
         """What a model needs of it, for samples at `fs` in Hz."""
@@ -56,7 +55,7 @@ class LimitedCommand:
             size=self.speed * fs,
             std=self.std * fs,
             reach=self.fastest * fs,
-            between=self.between,
+            between="bandlimited",
         )
 
 
@@ -75,24 +74,14 @@ def limited_command(u: Real, joint: JointFit) -> LimitedCommand | None:
     start = min(plain, key=lambda trial: trial.criterion)
     if best.fit.cost < PART**2 * start.fit.cost:
         return None  # a limit makes harmonics, which poles cannot imitate that well
-    # Between its samples the command may be smooth; a held one jumps, at any speed.
-    command = _Followed.of(u, "bandlimited", problem, start.fit)
+    command = _Followed.of(u, problem, start.fit)
     linear = fit_structure(problem, best.fit.structure, best.fit.theta)  # as those with a limit
     near = _nearest(command, linear)
-    if near is None:
-        return None
-    found = _profiled(u, command, *near)
-    speed, least = near if found is None else (found[0].speed / FINE, found[1])
-    other = _Followed.of(u, "foh", problem, start.fit)
-    if other.fit(speed, least).cost < TWICE * least.cost:
-        both = [each for each in (found, _profiled(u, other, speed, least)) if each]
-        found = min(both, key=lambda each: each[1].cost, default=None)
+    found = None if near is None else _profiled(u, command, *near)
     if found is None or _log_odds(problem, found[1], linear) <= CLEARLY:
         return None
     limited, fit = found
-    plainly = linear
-    if start is not best:
-        plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
+    plainly = fit_structure(problem, start.fit.structure, start.fit.theta)
     gained = 0.5 * problem.counted * float(np.log(plainly.cost / fit.cost))
     others = bends(u, problem, plainly, intersample=start.intersample)
     if any(other.kind != "rate_limit" and other.gain > gained for other in others):
@@ -133,17 +122,16 @@ class _Followed:
     """A command on the finer clock, and the data with a plain fit to them."""
 
     fine: Real
-    between: Intersample
     fastest: float  # greatest speed of the command, in the input's unit per fine step
     problem: Problem
     start: Fit
 
     @classmethod
-    def of(cls, u: Real, mode: Intersample, problem: Problem, start: Fit) -> "_Followed":
-        """Take the command from its first sample to its last."""
-        fine = finely(u, mode)
+    def of(cls, u: Real, problem: Problem, start: Fit) -> "_Followed":
+        """Take the command from its first sample to its last; between them it is band-limited."""
+        fine = finely(u, "bandlimited")
         fastest = float(np.max(np.abs(np.diff(fine))))
-        return cls(fine=fine, between=mode, fastest=fastest, problem=problem, start=start)
+        return cls(fine=fine, fastest=fastest, problem=problem, start=start)
 
     def at(self, speed: float) -> Problem:
         """The data, with the command as it is followed at this speed."""
@@ -218,7 +206,6 @@ def _profiled(
         values=_followed(command.fine, share * fastest),
         recorded=u,
         slope=command.slope(share * fastest, fit),
-        between=command.between,
     )
     return limited, fit
 

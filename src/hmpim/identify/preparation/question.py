@@ -113,8 +113,7 @@ def recognise_software(question: Question) -> Question:
     fewest = filters.structure.parameters
     plainer = tuple(name for name in PLAIN if STRUCTURES[name].parameters < fewest)
     if plainer and any(
-        trial.fit.cost <= enough and trial.fit.structure.parameters < fewest
-        for trial in joint_fit(u, y, structures=plainer).trials
+        one.fit.cost <= enough for one in joint_fit(u, y, structures=plainer).trials
     ):
         return question
     return replace(question, intersample="sampled", structures=names, exact=True)

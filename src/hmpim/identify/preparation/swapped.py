@@ -58,8 +58,6 @@ def is_swapped(u: Real, y: Real, valid: Mask) -> bool:
     by a fifth, each relative to past and future; no other step contradicts; and `y` is no integral
     of `u`.
     """
-    if np.count_nonzero(valid) < _FEWEST:
-        return False
     if not valid.all():
         u, y = (np.where(valid, x - x[valid].mean(), 0.0) for x in (u, y))
     if not likeness(u, y, longest_lag(u.size)).is_ahead:
