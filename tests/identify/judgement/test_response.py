@@ -8,7 +8,7 @@ import scipy.signal
 
 from hmpim import Record, identify
 from hmpim.identify.judgement.response import bandwidth_disagrees
-from hmpim.identify.reading.bandwidth import less_bias
+from tests_support import field_chirp, second_order_lag
 
 
 def test_a_clean_record_gives_no_finding(clean):
@@ -113,10 +113,31 @@ def test_what_the_estimator_makes_of_four_lines_is_not_held_against_the_model():
     assert abs(pair.natural_frequency.value - truth) < 4.5 * pair.natural_frequency.spread
 
 
-def test_a_bias_of_the_estimator_is_taken_off_and_adds_to_the_error(clean):
-    stated, measured = clean.readings.parameters, clean.measured
-    true, found = stated.bandwidth_3db.value, measured.bandwidth_3db
-    own = replace(measured, bandwidth_3db=replace(found, value=true + 0.7))
-    corrected = less_bias(measured, own, stated).bandwidth_3db
-    assert corrected.value == pytest.approx(found.value - 0.7)
-    assert corrected.spread == pytest.approx(np.hypot(found.spread, 0.7))
+def measured_and_true(delay, structures=None):
+    """The measured response of a resonance behind a delay, and the true one, in the band."""
+    fs, n = 200.0, 2000
+    time = np.arange(n) / fs
+    omega, zeta = 2 * np.pi * 6.0, 0.15
+    y = second_order_lag(time, field_chirp, delay=delay, natural_frequency=6.0, damping_ratio=zeta)
+    y += 0.002 * np.random.default_rng(7).standard_normal(n)
+    record = Record.from_arrays({"u": field_chirp(time)}, {"y": y}, fs=fs)
+    pair = identify(record, structures=structures)["y", "u"]
+    measured = pair.frequency_response
+    s = 2j * np.pi * measured.frequency
+    true = np.exp(-s * delay) / (1 + 2 * zeta * s / omega + (s / omega) ** 2)
+    return measured, true
+
+
+def test_motion_that_is_answered_after_the_record_does_not_bias_the_measured_response():
+    measured, true = measured_and_true(delay=4.0)
+    error = np.abs(measured.response - true)
+    assert np.mean(error < 3 * measured.std) > 0.95
+    assert np.mean(error < 0.05 * np.abs(true)) > 0.95
+
+
+def test_the_measured_response_shows_what_the_model_misses():
+    measured, true = measured_and_true(delay=0.05, structures=("first_order",))
+    near = np.abs(measured.frequency - 6.0) < 2.0
+    off = np.abs(measured.response[near] / true[near] - 1.0)
+    assert np.max(np.abs(true)) > 3.0
+    assert np.median(off) < 0.01

@@ -116,9 +116,9 @@ def _pieces(
     leading = joined.fits[joined.leading].best.fit
     delay = min(max(leading.delay, 0.0), 0.4 * aligned.samples) / aligned.fs
     parts = [fit.best.fit.prediction - fit.best.fit.linear[-1] for fit in joined.fits]
-    y, left = output.values, output.values - joined.prediction
+    y, predicted = output.values, joined.prediction
     if joined.disturbance is not None:
-        y = y - joined.disturbance
+        y, predicted = y - joined.disturbance, predicted - joined.disturbance
     span = aligned.samples / aligned.fs - delay
     edges = sorted({edge for band in inputs.bands for edge in band})
     pieces: list[tuple[list[int], JointResponse]] = []
@@ -128,11 +128,12 @@ def _pieces(
         if not active or bins < 8 * (len(active) + 1) + 2:
             continue
         others = [j for j, fit in enumerate(joined.fits) if j not in active and fit.related]
+        outside = sum((parts[j] for j in others), np.zeros(y.size))
         found = joint_response(
             np.stack([aligned.inputs[j].values for j in active]),
-            y - sum(parts[j] for j in others),
-            left,
+            y - outside,
             aligned.fs,
+            predicted=predicted - outside,
             delay=delay,
             band=(low, high),
             valid=counts,

@@ -85,9 +85,9 @@ class _Joint:
 def joint_response(
     inputs: Real,
     y: Real,
-    left: Real,
     fs: float,
     *,
+    predicted: Real,
     delay: float,
     band: tuple[float, float],
     valid: Mask | None,
@@ -95,18 +95,17 @@ def joint_response(
 ) -> JointResponse:
     """Return the responses of a model's residual to all inputs of one simultaneous test.
 
-    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output
-    `y`, (n,), of which the coherences are the share explained, and the residual `left`, (n,),
-    follow them by a delay in s, not negative; a rough value suffices. Where the output is not
-    `valid`, (n,), the model replaces it. `names` are those of the inputs, then of the output, for
-    messages. Inputs that are multiples or sums of others over the whole band are refused, and so is
-    a band with too few bins.
+    The inputs, (m, n), are at rest before the record, and each excites the band, in Hz. The output,
+    (n,), follows them by a delay in s, not negative; a rough value suffices. It is `predicted`,
+    (n,), by a model with its bias, which also takes its place where it is not `valid`, (n,). The
+    coherences are those of the output itself. `names` are those of the inputs, then of the output,
+    for messages. Inputs that are multiples or sums of others over the whole band are refused, and
+    so is a band with too few bins.
     """
     m, samples = inputs.shape
     check_band(band, fs)
     share = _share(valid, names[-1])
-    if valid is not None:
-        y, left = np.where(valid, y, y - left), np.where(valid, left, 0.0)
+    y = y if valid is None else np.where(valid, y, predicted)
     base = int(np.floor(delay * fs + 1e-9))
     step = fs / (samples - base)
     bins = (samples - base - 1) // 2 + 1
@@ -120,7 +119,7 @@ def joint_response(
     centre = centres_in_band(low, high, _POINTS)
     moved = _moved(inputs, delay * fs, base)
     coherence = _chosen(moved, y[base:], centre)[-1]
-    response, variance, condition, _ = _chosen(moved, left[base:], centre)
+    response, variance, condition, _ = _chosen(moved, (y - predicted)[base:], centre)
     frequency = centre * step
     usable = np.maximum(_input_condition(moved, centre), condition) <= _WORST
     response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
