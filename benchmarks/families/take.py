@@ -326,9 +326,12 @@ def _sampled_response(take: Take) -> Callable[[np.ndarray], np.ndarray]:
 
     def at(frequency: np.ndarray) -> np.ndarray:
         h = linear_output(moved, impulse, start=-ahead / fs)
+        for _ in range(system.integrators):  # its response does not end, but its steps do
+            h = np.diff(h, prepend=0.0)
         time = (np.arange(h.size) - ahead) / fs
         behind = np.array([h @ np.exp(-2j * np.pi * f * time) for f in frequency])
         s = 2j * np.pi * np.asarray(frequency)
+        behind = behind / (1.0 - np.exp(-s / fs)) ** system.integrators
         return behind * np.prod([1.0 + s * lead for lead in before], axis=0)
 
     return at

@@ -86,7 +86,7 @@ def _is_well_known(fleet: Fleet, group: Group, simpler: Real) -> Mask:
     cost = fit.cost[group.some]
     known = n * np.log(simpler / cost[:, None]).min(axis=1) > 2 * EXCLUDED
     for name in SIZES:
-        if name in group.alone and name != "time_constant":  # as in `weak_excitation`
+        if name in group.alone:
             column = group.alone[name]
             known &= np.isnan(column.value) | (column.std <= MUCH * np.abs(column.value))
     delay = group.alone["delay"]

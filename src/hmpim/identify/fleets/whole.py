@@ -29,7 +29,7 @@ from hmpim.identify.nonlinear.bends import bends, bent_shapes
 from hmpim.identify.nonlinear.mechanisms import LONGEST
 from hmpim.identify.nonlinear.period import find_period
 from hmpim.identify.nonlinear.sweep_phase import SweepPhase, sweep_phase
-from hmpim.identify.reading.bandwidth import disagreeing, response_bandwidths
+from hmpim.identify.reading.bandwidth import beside_model, disagreeing, response_bandwidths
 from hmpim.identify.reading.figures import system_of
 from hmpim.identify.reading.readings import from_lag
 from hmpim.identify.reading.spanned import spanned
@@ -147,16 +147,17 @@ def whole_pairs(
         places, measured = places[covered], measured[covered]
         responses = local_responses(
             fleet.u,
-            measured,
+            group.residual[places],
             fleet.fs,
             delays=group.fit.theta[some[places], 0] / fleet.fs,
             band=fleet.band,
         )
         papers = estimates_of_many(fleet.u, measured, fleet.fs, fleet.band)
-        for k, response, paper in zip(places.tolist(), responses, papers, strict=True):
+        for k, left, paper in zip(places.tolist(), responses, papers, strict=True):
             i = int(some[k])
             vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
             system = system_of(fleet.structure, vector, fleet.fs)
+            response = beside_model(left, system, fs=fleet.fs, intersample=mode)
             own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
             crossings = response_bandwidths(response, system, own, fs=fleet.fs, intersample=mode)
             if disagreeing(crossings, own):
