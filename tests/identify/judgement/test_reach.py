@@ -106,10 +106,10 @@ def _slowed(evidence, time_constant, name="first_order"):
     return replace(evidence, joint=replace(joint, best=replace(joint.best, fit=fit)))
 
 
-def test_a_record_that_ends_before_the_system_settles_casts_doubt(clean):
+def test_a_record_that_ends_before_the_system_settles_says_so(clean):
     """Five time constants of 2 s and the delay are 10.15 s of 10."""
     (found,) = short_record(_slowed(clean, 2.0 * clean.fs))
-    assert (found.code, found.severity, found.parameters) == ("short_record", "doubt", MODELLED)
+    assert (found.code, found.severity, found.parameters) == ("short_record", "info", MODELLED)
     assert "settling time of 10.15 s" in found.message
     assert not [*short_record(_slowed(clean, 1.9 * clean.fs))]
 
@@ -144,6 +144,24 @@ def test_a_few_lines_tell_no_more_than_gain_and_phase_at_each(evidence_of, lines
         assert finding.severity == "doubt"
         assert set(MODELLED) - set(finding.parameters) == {"bias", "noise_std"}
         assert f"excites {lines} frequenc" in finding.message
+
+
+def test_a_start_from_rest_tells_more_than_lines_do():
+    # A sweep of a few bins: gain and phase at one line, but what follows the start shows all.
+    time = np.arange(100) / 100.0
+
+    def drive(t):
+        return np.where(t > 0, np.sin(2 * np.pi * (0.5 * t + 4.0 * t**2)), 0.0)
+
+    y = second_order_lag(time, drive, delay=0.03, natural_frequency=6.0, damping_ratio=0.5)
+    y += 0.002 * np.random.default_rng(3).standard_normal(100)
+    (pair,) = hmpim.identify(hmpim.Record.from_arrays({"u": drive(time)}, {"y": y}, fs=100.0))
+    assert pair.structure == "second_order"
+    assert "few_lines" not in {warning.code for warning in pair.warnings}
+    p = pair.parameters
+    for estimate, truth in ((p.delay, 0.03), (p.natural_frequency, 6.0), (p.damping_ratio, 0.5)):
+        assert estimate.verdict == "ok"
+        assert abs(estimate.value - truth) < 4.0 * estimate.spread
 
 
 def test_a_free_response_as_slow_as_a_drift_makes_the_bias_doubtful(clean):

@@ -199,7 +199,10 @@ def unreached_bandwidths(missing: Sequence[str], *, band_end: float) -> Finding:
 
 
 def short_record(evidence: Evidence) -> Iterator[Finding]:
-    """Doubt all figures of a record that ends before the system has settled."""
+    """Say that a record ends before the system has settled: a longer one would tell more.
+
+    A record from rest, or with a free initial state, needs no settling: the intervals hold.
+    """
     fit = evidence.joint.best.fit
     settle = (max(fit.delay, 0.0) + fit.memory) / evidence.fs
     length = evidence.joint.problem.y.size / evidence.fs
@@ -209,7 +212,7 @@ def short_record(evidence: Evidence) -> Iterator[Finding]:
         code="short_record",
         message=f"The record of {length:.4g} s is short against the system's settling time of "
         f"{settle:.4g} s. Record at least {2 * settle:.3g} s.",
-        severity="doubt",
+        severity="info",
         parameters=MODELLED,
     )
 
@@ -282,11 +285,16 @@ def few_lines(evidence: Evidence) -> Iterator[Finding]:
     """Doubt a model with more figures than the input's lines can determine.
 
     A line determines gain and phase at its frequency only. A white residual is still the noise.
+    What follows a start from rest may determine more: if it excludes one more pole, it shows
+    dynamics that the model lacks.
     """
     lines = lines_of(evidence.u).count
-    fit = evidence.joint.best.fit
+    fit, hidden = evidence.joint.best.fit, evidence.joint.hidden
     unknown = fit.theta.size + fit.linear.size - 1
     if 2 * lines >= unknown + _SPARE:
+        return
+    rests = evidence.joint.problem.begins is None
+    if rests and hidden is not None and hidden.limit < PART * hidden.scale:
         return
     known = ("bias", "noise_std") if evidence.readings.white else ("bias",)
     yield Finding(
