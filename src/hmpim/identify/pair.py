@@ -53,7 +53,6 @@ from hmpim.identify.result.groups import EVERY
 from hmpim.identify.section_iv.paper import paper_estimates
 from hmpim.identify.worth import WORTH
 from hmpim.model.nonlinear import NonlinearPart
-from hmpim.model.response import response_std
 from hmpim.record import Finding, Signal
 
 __all__ = ["Described", "describe", "describe_dead"]
@@ -342,9 +341,6 @@ def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyR
     The residual is linear in the output, and so is a local fit: together they are the response of
     the output, but what biases a local fit (few lines, a notch of the input, motion before or after
     the record) then biases only what the model misses.
-
-    Noise decides which samples near a level are clipped, so the others are not a fair selection:
-    their expected residual takes their place, and the model's error is added.
     """
     question, fit, u = own.question, joint.best.fit, own.source.values
     fs = question.aligned.fs
@@ -354,15 +350,8 @@ def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyR
         left = local_response(u, fit.residual, fs, delay=fit.delay / fs, band=own.band)
     else:
         left = own.matrix.columns[own.i]
-    response = beside_model(left, readings.system, fs=fs, intersample=joint.best.intersample)
-    if own.matrix is not None:
-        return response
-    counted = own.found.counting(np.asarray(question.output.valid), fs)
-    covariance = readings.coefficient_covariance
-    if counted is None or not np.isfinite(covariance).all():
-        return response
-    model_std = response_std(readings.system, covariance, response.frequency)
-    return replace(response, std=np.hypot(response.std, model_std))
+    covariance, between = readings.coefficient_covariance, joint.best.intersample
+    return beside_model(left, readings.system, covariance, fs=fs, intersample=between)
 
 
 def _spread(joint: JointFit) -> float:

@@ -44,6 +44,7 @@ from hmpim.identify.result.groups import BANDWIDTHS, EVERY
 from hmpim.identify.section_iv.paper import estimates_of_many
 from hmpim.identify.worth import WORTH
 from hmpim.model import RationalDelay
+from hmpim.model.response import by_falling_powers
 from hmpim.record import Finding
 
 __all__ = ["Whole", "learn_whole", "whole_pairs"]
@@ -157,7 +158,9 @@ def whole_pairs(
             i = int(some[k])
             vector = np.concatenate([theta_at(group.fit.theta[i]), [group.fit.gain[i], 0.0]])
             system = system_of(fleet.structure, vector, fleet.fs)
-            response = beside_model(left, system, fs=fleet.fs, intersample=mode)
+            covariance = _covariance(fleet, group, k, system)
+            rising = by_falling_powers(covariance, 1)
+            response = beside_model(left, system, rising, fs=fleet.fs, intersample=mode)
             own = parameters_of({name: group.alone[name] for name in bandwidths}, k)
             crossings = response_bandwidths(response, system, own, fs=fleet.fs, intersample=mode)
             if disagreeing(crossings, own):
@@ -179,7 +182,7 @@ def whole_pairs(
                 warnings=(*findings, *_findings(fleet, group, k, own)),
                 from_response=crossings,
                 nonlinearity=_NOTHING,
-                covariance=_covariance(fleet, group, k, system),
+                covariance=covariance,
             )
             found[i] = judged(pair)
     return found

@@ -33,7 +33,7 @@ from hmpim.identify.nonlinear.rows import (
 from hmpim.identify.result import Estimate
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.sizes import size_in_words
-from hmpim.identify.worth import MATERIAL, MOST, PART, TWICE
+from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TWICE
 from hmpim.model.dynamics import STRUCTURES, StructureName
 from hmpim.model.nonlinear import KIND_WORDS, Kind, NonlinearPart
 from hmpim.record import Finding
@@ -118,7 +118,8 @@ def linear_starts(
     """
     if plain.is_white:
         return [plain]
-    hopeless = joint.best.fit.cost / PART**2  # `kinds_in_question` skips such a fit
+    # `kinds_in_question` skips such a fit.
+    hopeless = np.inf if problem.filtered else joint.best.fit.cost / PART**2
     starts = {}
     if plain.structure.name == "second_order" and plain.delay > 0.0:
         start = np.append(plain.theta, np.log(MOST * plain.delay))
@@ -157,7 +158,12 @@ def kinds_in_question(
         seen = bends(command.u, problem, fit, intersample=command.intersample)
         kinds = [one.kind for one in seen if one.certain]
         if fit.structure.name in _SERVOS:
-            kinds = ["friction"] if any(kind in ALIKE for kind in kinds) else []
+            alike = any(kind in ALIKE for kind in kinds)
+            # Where a linear fit leaves white noise, friction must explain about as much.
+            rest = (1.0 - seen[0].share) * fit.cost if seen else np.inf
+            kinds = (
+                ["friction"] if alike and (not best.is_white or rest < TWICE * best.cost) else []
+            )
         for kind in dict.fromkeys(kinds):
             found.setdefault(kind, []).append(fit)
     return found
@@ -190,8 +196,9 @@ def _in_turns(one: NonlinearRow, problem: Problem, start: Fit) -> NonlinearRow |
     at = np.append(start.theta, one.size / scale)
     tried: list[Real] = []
     changes: list[Real] = []
-    nearest, least = None, PART
-    for _ in range(TURNS):
+    nearest, least, last, counted = None, PART, np.inf, problem.counted
+    ever: Mask | None = None  # samples that have counted in every turn since the first restart
+    for turn in range(TURNS):
         data = with_row(problem, one)
         if data.counted < _FEWEST:
             break
@@ -202,6 +209,12 @@ def _in_turns(one: NonlinearRow, problem: Problem, start: Fit) -> NonlinearRow |
             nearest, least = one, deviance
         if least < MATERIAL:
             break
+        many = deviance > last and abs(data.counted - counted) > FEW * counted
+        if many or turn == TURNS // 2:  # restart: many samples come and go, or a few ever again
+            tried.clear()
+            changes.clear()
+            ever = one.counts
+        last, counted = deviance, data.counted
         tried.append(at)
         changes.append(np.append(fit.theta, fit.nuisance[-1] / scale) - at)
         at = _ahead(tried, changes)
@@ -210,6 +223,9 @@ def _in_turns(one: NonlinearRow, problem: Problem, start: Fit) -> NonlinearRow |
         there = fit_structure(data, structure, at[:-1], iterations=0)
         sizes = np.append(there.nuisance[:-1], at[-1] * scale)
         one = one.again(data, replace(there, nuisance=sizes))
+        if ever is not None and one.counts is not None:
+            one = replace(one, counts=one.counts & ever)
+            ever = one.counts
     return nearest
 
 
@@ -230,12 +246,15 @@ def is_rounding(problem: Problem, fit: Fit, rounding: float) -> bool:
 
 
 def leaves_noise(joint: JointFit, one: NonlinearRow, rounding: float) -> bool:
-    """Whether a fit leaves noise, also at samples that do not depend on the linear part."""
+    """Whether a fit leaves noise, also at samples that do not depend on the linear part.
+
+    Rounding may look like an effect that is smaller than itself.
+    """
     problem, fit = joint.problem, joint.best.fit
     size = float(fit.nuisance[-1])
     if size <= 0.0 and one.kind not in _EITHER_WAY:
         return False
-    if is_rounding(problem, fit, rounding):
+    if is_rounding(problem, fit, rounding) and float(np.std(size * one.row)) > rounding:
         return True
     every = (problem.y - fit.prediction)[max(joint.forgotten, one.begins) :]
     return fit.is_white and is_white(every)

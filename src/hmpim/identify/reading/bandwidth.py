@@ -18,6 +18,7 @@ from hmpim.identify.result.groups import BANDWIDTHS
 from hmpim.identify.worth import PART, TOLERATED
 from hmpim.model import RationalDelay, response
 from hmpim.model.discrete import discretise, fed_forward_response
+from hmpim.model.response import response_std
 from hmpim.record import Intersample
 
 __all__ = [
@@ -79,11 +80,24 @@ def sampled_response(
 
 
 def beside_model(
-    left: FrequencyResponse, system: RationalDelay, *, fs: float, intersample: Intersample
+    left: FrequencyResponse,
+    system: RationalDelay,
+    covariance: Real,
+    *,
+    fs: float,
+    intersample: Intersample,
 ) -> FrequencyResponse:
-    """Return the response of an output: the model's, and that measured on the model's residual."""
+    """Return the response of an output: the model's, and that measured on the model's residual.
+
+    What a least-squares fit explains of the noise is independent of its residual, so the variances
+    add. The covariance is that of `hmpim.model.response.response_std`; a model of which it is
+    unknown adds none.
+    """
     modelled = sampled_response(system, left.frequency, fs=fs, intersample=intersample)
-    return replace(left, response=left.response + modelled)
+    std = left.std
+    if np.isfinite(covariance).all():
+        std = np.hypot(std, response_std(system, covariance, left.frequency))
+    return replace(left, response=left.response + modelled, std=std)
 
 
 def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:
