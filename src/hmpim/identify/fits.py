@@ -30,6 +30,7 @@ from hmpim.identify.fitting.course import (
     continue_between,
     continued,
     free_from_wander,
+    resumed,
     start,
     turn_ahead,
 )
@@ -147,7 +148,7 @@ def _fit_and_look_for_rows(
         return fitted
     if question.swapped or question.exact or (software and len(fitted.fits) > 1):
         return fitted
-    return _WithRows(question, seen, fitted).found()
+    return _WithRows(question, seen, fitted, begun if isinstance(begun, Course) else None).found()
 
 
 class _WithRows:
@@ -157,25 +158,27 @@ class _WithRows:
     inputs are fitted again.
     """
 
-    def __init__(self, question: Question, seen: Imperfections, fitted: OutputFit) -> None:
+    def __init__(
+        self, question: Question, seen: Imperfections, fitted: OutputFit, begun: Course | None
+    ) -> None:
         self.question, self.seen, self.first = question, seen, fitted
         self.several = len(fitted.fits) > 1
         slow = fitted.slow if self.several else 0
         self.asked = fitted.leading if slow is None else slow
         self.latest = fitted  # with the rows that were tried last
-        self.begun: Course | None = None  # plain fits of a single input with rows
+        self.begun = begun  # plain fits of a single input, at first without rows
         self.between: Fits = []  # the same under each assumption between the samples
         self.humming: Humming | None = None
         self.hum = np.zeros(0)
 
     def found(self) -> OutputFit:
         """The fit with hum and a drift, or without where it does not need them."""
-        joint = self.first.fits[self.asked]
+        joint, begun = self.first.fits[self.asked], self.begun
         coloured = not is_white(joint.problem.counting(joint.best.fit.residual))
         if coloured and not any(_has_lines(u.values) for u in self.question.aligned.inputs):
             self.humming = with_hum(joint, self.with_rows)
         if self.humming is None:  # as if it had not been tried
-            self.latest = self.first
+            self.begun, self.between, self.latest = begun, [], self.first
         steady = self.first if self.humming is None else self.latest
         before = joint if self.humming is None else self.humming.joint
         joint, drifting = with_drift(before, self.with_rows)
@@ -202,14 +205,14 @@ class _WithRows:
         return quiet
 
     def _fitted(self, names: tuple[StructureName, ...], rows: Real) -> OutputFit:
-        """Fit all inputs with rows; plain fits of a single input are made once for these."""
+        """Fit all inputs with rows; plain fits of a single input are made once for as many rows."""
         question, seen, course = self.question, self.seen, self.begun
         if self.several or question.intersample == "sampled":
             led = self.latest.led
             return fit_once(question, seen, names, rows, begun=led)
-        if course is None or not np.array_equal(course.problem.fixed()[1:], rows):
-            # What the rows explain may have led fits without them astray.
-            course = completed(free_from_wander(turn_ahead(started(question, seen, rows))))
+        known = 0 if course is None or course.data.nuisance is None else len(course.data.nuisance)
+        if course is None or len(rows) != known:
+            course = started_with(question, seen, rows, course)
             self.begun, self.between = course, continue_between(course)
         others = tuple(name for name in course.others if name in names)
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
@@ -294,6 +297,21 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
         question.structures,
         rows,
     )
+
+
+def started_with(
+    question: Question, seen: Imperfections, rows: Real, known: Course | None
+) -> Course:
+    """Plain fits of one input with other rows than the `known` ones.
+
+    They continue from these if that leaves white noise. Otherwise what the rows explain may have
+    led the known fits astray, and they are started from the spectra.
+    """
+    if known is not None and known.data.noise is None:
+        course = resumed(known, replace(known.problem, nuisance=rows), known.fits)
+        if course.best.is_white:
+            return course
+    return completed(free_from_wander(turn_ahead(started(question, seen, rows))))
 
 
 def counted_in(question: Question, seen: Imperfections) -> Mask | None:
