@@ -144,21 +144,25 @@ def _chosen(
 ) -> tuple[Complex, Real]:
     """Response and variance at each centre, of each record.
 
-    The polynomials give the start of the rational functions, which are fitted over the two widest
-    windows. Narrower windows follow, one by one, for records that do not suffice with these: the
-    narrowest so far, or a polynomial narrower than the next, is chosen at many frequencies, or a
-    bin of the residual exceeds the noise, whose power has an exponential distribution.
+    Rational functions are fitted if the polynomials, which give their start, need narrow windows:
+    over the two widest windows first. Narrower windows follow, one by one, for records that do not
+    suffice with these: the narrowest so far, or a polynomial narrower than the next, is chosen at
+    many frequencies, or a bin of the residual exceeds the noise, whose power has an exponential
+    distribution.
     """
     widths, polynomials = _polynomials(spectra, centre)
-    _, response, variance = choose(polynomials, ())
+    chosen, response, variance = choose(polynomials, ())
     rational = _rational_widths(centre, spectra.u.size)
-    if not rational:
+    # Two fits of each width: if wide polynomials suffice, no more is needed.
+    rough = (chosen < 2 * (len(widths) - 2)).mean(axis=-1) > PART
+    if not rational or not rough.any():
         return response, variance
+    polynomials = [fit.of(rough) for fit in polynomials]
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectra.y.copy()
     between = [np.interp(inside, centre, own) for own in response]
     smooth[:, inside] = spectra.u[inside] * np.stack(between)
-    open_records = np.arange(spectra.y.shape[0])
+    open_records = np.flatnonzero(rough)
     fits: list[LocalFit] = []
     for k, width in enumerate(rational):
         some = Spectra(frequency=spectra.frequency, u=spectra.u, y=spectra.y[open_records])
