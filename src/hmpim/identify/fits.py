@@ -34,9 +34,10 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits
+from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
+from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -134,6 +135,10 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if found is None:
         return None
     joint, drifting = found
+    best = joint.best.fit  # richer dynamics may explain the slow part
+    tail = hidden_tail(joint.weighed, best, share=joint.weighed_share)
+    if follows(course.data, best) or tail is not None:
+        return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
 

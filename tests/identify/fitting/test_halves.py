@@ -55,6 +55,7 @@ def test_friction_in_a_half_that_hardly_moves_is_no_change_of_the_unit():
     halves = products_of_halves(rows, left)
     quiet = compare_halves(halves, u, share=1.0)
     assert quiet.probability < 1e-6
+    assert quiet.share > 0.2
     own = left[n // 2 :] / u[n // 2 :].std()
     assert own.std() > 0.05
     assert quiet.owed < 0.003

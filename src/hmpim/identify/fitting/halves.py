@@ -27,9 +27,9 @@ class Halves:
 
     # chance of so large a difference if one model were right for both and the noise white
     probability: float
-    # r.m.s. of the residual that a model for each half would explain, over that of the output.
-    # In one half of a sweep the output hardly moves; friction is much of that half, but little of
-    # the record
+    share: float  # of the residual's power that a model for each half would explain
+    # the same as an r.m.s., over that of the whole output. In one half of a sweep the output hardly
+    # moves; friction is much of that half, but little of the record
     owed: float
 
 
@@ -40,9 +40,10 @@ def compare_halves(halves: Real, y: Real, *, share: float) -> Halves:
     count; `share` is that of independent samples.
     """
     chance, gained = halves_of(halves[:, None], y.size, share=share)
-    size = float(np.vecdot(y, y))
+    power, size = float(halves[:, -1, -1].sum()), float(np.vecdot(y, y))
     return Halves(
         probability=float(chance[0]),
+        share=float(gained[0]) / power if power > 0 else 0.0,
         owed=float(np.sqrt(gained[0] / size)) if size > 0 else 0.0,
     )
 

@@ -14,7 +14,7 @@ from hmpim.identify.noise.input_noise import input_noise
 from hmpim.identify.noise.whiteness import is_steady
 from hmpim.identify.result.digits import percent
 from hmpim.identify.result.groups import GAIN, MODELLED
-from hmpim.identify.worth import FEW, MATERIAL, PART, TOLERATED, WORTH
+from hmpim.identify.worth import FEW, MATERIAL, MOST, PART, TOLERATED, WORTH
 from hmpim.model import response
 from hmpim.record import Finding
 
@@ -48,31 +48,37 @@ _FAST = 9
 def lack_of_fit(evidence: Evidence) -> Iterator[Finding]:
     """Say that the residual still follows the input.
 
-    If more than 3 % of the output follows, all figures of the model are in doubt. Otherwise the
-    noise is, if a tenth of the residual's power follows.
+    If more than 3 % of the output follows, all figures of the model are in doubt. The noise is in
+    doubt if a tenth of the residual's power follows; if a fifth does, so is each figure that this
+    may move by 1 %: a figure moves at most by its deviation, for white noise, times the root of
+    this part over the noise (Cauchy-Schwarz).
     """
     misfit = evidence.misfit
     if misfit.probability >= FALSE_ALARM or misfit.share == 0.0:
         return
     owed = float(np.sqrt(misfit.share)) * evidence.unexplained
     name = structure_in_words(evidence.joint.best.fit.structure.name)
-    large = owed > TOLERATED
+    large, moved = owed > TOLERATED, MODELLED
     much = misfit.share > 2 * FEW  # otherwise the noise is off by a few per cent at most
+    if large and not much:
+        moved = tuple(name for name in MODELLED if name != "noise_std")
+    elif much and not large:
+        some = owed > WORTH and misfit.share > PART
+        moved = moved_by(evidence, misfit.share) if some else ("noise_std",)
     yield Finding(
         code="lack_of_fit",
         message=f"The residual still follows the input: about {percent(owed)} % of the output "
         f"(r.m.s.) is not described by the {name} model. "
         "Look at the Bode plot where model and measurement differ.",
         severity="doubt" if large or much else "info",
-        parameters=("noise_std",) if much and not large else MODELLED,
+        parameters=moved,
     )
 
 
 def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
     """The noise, and figures that a share of the residual's power may move by 1 % at most.
 
-    They move most if that part of the residual is along their own derivatives: by the deviation,
-    for white noise, times the root of that part over the noise (Cauchy-Schwarz).
+    They move most if that part of the residual is along their own derivatives.
     """
     joint = evidence.joint
     count = joint.problem.counted * joint.effective_share
@@ -94,14 +100,15 @@ def moved_by(evidence: Evidence, share: float) -> tuple[str, ...]:
 
 
 def coloured_noise(evidence: Evidence) -> Iterator[Finding]:
-    """Say that the residual is not white."""
+    """Say that the residual is not white; a doubt if it is most of the output and follows u."""
     if evidence.readings.white:
         return
+    follows = evidence.misfit.probability < FALSE_ALARM
     yield Finding(
         code="coloured_noise",
         message="The residual is not white (one independent sample in "
         f"{1 / evidence.joint.effective_share:.3g}); the error bars are widened for it.",
-        severity="info",
+        severity="doubt" if evidence.unexplained > MOST and follows else "info",
         parameters=MODELLED,
     )
 
@@ -181,7 +188,8 @@ def uneven_noise(evidence: Evidence) -> Iterator[Finding]:
 def halves_disagree(evidence: Evidence) -> Iterator[Finding]:
     """Say that the halves of the record do not share the model.
 
-    All figures are in doubt if models of the halves would explain much more of the output.
+    As in `lack_of_fit`, all figures are in doubt if models of the halves would explain much more of
+    the output, else those that the difference may move.
     """
     share, weighed = evidence.joint.weighed_share, evidence.joint.weighed
     output = weighed.masked(weighed.y - weighed.counting(weighed.y).mean())
@@ -189,14 +197,17 @@ def halves_disagree(evidence: Evidence) -> Iterator[Finding]:
     alarm = FALSE_ALARM * share  # the share of coloured noise is estimated
     if halves.probability >= alarm or halves.owed <= WORTH:
         return
+    moved = MODELLED if halves.owed > TOLERATED else ()
+    if not moved and halves.share > PART:
+        moved = moved_by(evidence, halves.share)
     yield Finding(
         code="halves_disagree",
         message="The two halves of the record require different models, which describe "
         f"{percent(halves.owed)} % of the output (r.m.s.) more than one model does: the unit "
         "changed during the test, or responds differently to large and small motion. Repeat "
         "it, or lower the amplitude.",
-        severity="doubt" if halves.owed > TOLERATED else "info",
-        parameters=MODELLED,
+        severity="doubt" if moved else "info",
+        parameters=moved or MODELLED,
     )
 
 
