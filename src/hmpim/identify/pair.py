@@ -339,15 +339,16 @@ def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyR
     """The model's response and the local response of the residual.
 
     The residual is linear in the output, and so is a local fit: together they are the response of
-    the output, but what biases a local fit (few lines, a notch of the input, motion before or after
-    the record) then biases only what the model misses.
+    the output, at the samples that count. But what biases a local fit (few lines, a notch of the
+    input, motion before or after the record) then biases only what the model misses.
     """
     question, fit, u = own.question, joint.best.fit, own.source.values
     fs = question.aligned.fs
     if question.instrument is not None:
         return response_through(question.instrument, joint.problem.y, fs, band=own.band)
     if own.matrix is None:
-        left = local_response(u, fit.residual, fs, delay=fit.delay / fs, band=own.band)
+        late = fit.delay / fs
+        left = local_response(u, fit.residual, fs, delay=late, band=own.band, residual=True)
     else:
         left = own.matrix.columns[own.i]
     covariance, between = readings.coefficient_covariance, joint.best.intersample

@@ -263,6 +263,7 @@ def settled(
             scale_factor=_widened(parameters.scale_factor, gain),
         )
         parameters, unknown = _determined(parameters, inputs.bands[i])
+    parameters = _finite(parameters)
     findings = list(pair.warnings)
     if unknown:
         bound = _bound(pair.frequency_response)
@@ -295,6 +296,12 @@ def settled(
                 )
             )
     return replace(pair, parameters=parameters, warnings=tuple(findings))
+
+
+def _finite(p: Parameters) -> Parameters:
+    """The parameters without those whose error is not finite."""
+    bad = [name for name, e in p.given.items() if not np.isfinite(e.spread)]
+    return replace(p, **dict.fromkeys(bad, None))
 
 
 def _widened(known: Estimate | None, variance: float) -> Estimate | None:

@@ -94,7 +94,7 @@ def with_plain_drift(
     """
     every = drift_rows(size)
     data, free = begun(every)
-    if not free.is_white:
+    if data.counted < _FEWEST or not free.is_white:
         return None
     columns = _shape(data, free, every)
     return _without_drift(fitted(columns), columns)

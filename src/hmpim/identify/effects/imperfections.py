@@ -113,8 +113,8 @@ def find_imperfections(
     """Look for saturation, hold, rounding, spikes and standstills in an output, (n,).
 
     Samples that are not `valid` were filled in, and lie on no grid. The prediction of a first model
-    shows saturation, spikes and standstills. `inputs` show whether
-    the output takes too few values, or stands still to its end; without them, neither is tested.
+    shows saturation, spikes and standstills. `inputs` show whether the output takes too few values,
+    or stands still to its end; without them, neither is tested.
     """
     rounding = detect_quantization(y if valid is None or valid.all() else y[valid])
     step = 0.0 if rounding is None else rounding.step

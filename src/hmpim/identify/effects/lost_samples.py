@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from hmpim.identify.arrays import Mask, Real, every_of
 from hmpim.identify.chance import BULK, DEVIATIONS
-from hmpim.identify.worth import FEW, MOST, PART, TWICE, WORTH
+from hmpim.identify.worth import FEW, MOST, MUCH, PART, TWICE, WORTH
 from hmpim.record.runs import runs_of
 
 __all__ = [
@@ -60,6 +60,8 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     if counted.size < 2 * _WINDOW or not stand_out(counted):
         return None
     bulk = float(np.median(np.abs(counted - np.median(counted)))) / BULK
+    if clipped is not None:
+        residual = np.where(clipped, np.median(counted), residual)
     around = sliding_window_view(np.pad(residual, _WINDOW // 2, mode="reflect"), _WINDOW)
     level = np.median(around, axis=1)
     distance = np.abs(residual - level)
@@ -71,7 +73,7 @@ def find_spikes(y: Real, prediction: Real, *, clipped: Mask | None = None) -> Ma
     for a, b in zip(*runs_of(away), strict=True):
         if b - a > _LONGEST_SPIKE:
             away[a:b] = False
-    return away if away.any() else None
+    return away if away.any() and np.mean(away) < MUCH else None
 
 
 def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
@@ -87,7 +89,10 @@ def find_frozen(y: Real, prediction: Real, *, step: float = 0.0) -> Mask | None:
             continue
         if float(np.ptp(prediction[a - 1 : b])) > least:
             frozen[a:b] = True
-    return frozen if frozen.any() else None
+    others = repeats[~frozen]
+    if not frozen.any() or others.size == 0 or np.mean(others) > MUCH:
+        return None
+    return frozen
 
 
 def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
@@ -96,10 +101,11 @@ def find_stuck(y: Real, inputs: Sequence[Real]) -> Mask | None:
     It needs no model, and runs before the first fit, which a sensor stuck for much of the record
     would spoil. A standstill at the lowest or highest value is clipping.
     """
-    if y[-1] != y[-2] or y[-1] in (y.min(), y.max()):
+    if y.size < _FEWEST_EQUAL or y[-1] != y[-2] or y[-1] in (y.min(), y.max()):
         return None
     first = int(np.flatnonzero(y != y[-1])[-1]) + 2
-    if y.size - first < PART * y.size:
+    others = np.diff(y[:first]) == 0.0
+    if y.size - first < PART * y.size or np.mean(others) > MUCH:
         return None
     if not any(np.ptp(u[first:]) > MOST * np.ptp(u) for u in inputs):
         return None

@@ -441,7 +441,12 @@ def almost_integrates(fit: Fit) -> bool:
 
 def _misses_part(problem: Problem, fit: Fit, data: Data) -> bool:
     """Whether the response is missed where the output hardly moves, as at the end of a sweep."""
-    span = slice(None) if problem.valid is None else problem.valid
+    span = slice(None)
+    if problem.valid is not None:
+        counted = np.flatnonzero(problem.valid)
+        span = slice(int(counted[0]), int(counted[-1]) + 1)
+        if counted.size < counted[-1] + 1 - counted[0]:
+            return False  # a spectrum needs samples without gaps
     missed = unexplained_response(
         data.u[span], data.y[span], fit.residual[span], delay=fit.delay, band=data.band
     )

@@ -152,6 +152,7 @@ def whole_pairs(
             fleet.fs,
             delays=group.fit.theta[some[places], 0] / fleet.fs,
             band=fleet.band,
+            residual=True,
         )
         papers = estimates_of_many(fleet.u, measured, fleet.fs, fleet.band)
         for k, left, paper in zip(places.tolist(), responses, papers, strict=True):

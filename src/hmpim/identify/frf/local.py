@@ -46,6 +46,7 @@ def local_response(
     band: tuple[float, float],
     delay: float = 0.0,
     points: int = 400,
+    residual: bool = False,
 ) -> FrequencyResponse:
     """Return the frequency response by local polynomials and local rational functions.
 
@@ -54,7 +55,8 @@ def local_response(
     the band and a quarter are always tried, narrower ones if these do not suffice. The delay is
     removed first and restored at the end; the bias is in the bin at DC, which is not used. If an
     input ends at another value than it began, as a step or a ramp does, that jump leaks into every
-    bin: then both signals are differenced, which does not change their ratio.
+    bin: then both signals are differenced, which does not change their ratio. `residual` says that
+    the output is a model's residual, which is often noise: simpler fits then suffice.
 
     Input and output, (n,), are on one clock; rate and excited band are in Hz, the pure delay is in
     s and need not be exact. The frequencies are bins of the record inside the band, at most
@@ -80,12 +82,21 @@ def local_response(
     """
     check_band(band, fs)
     delays = np.array([delay])
-    return local_responses(u, y[None], fs, delays=delays, band=band, points=points)[0]
+    return local_responses(
+        u, y[None], fs, delays=delays, band=band, points=points, residual=residual
+    )[0]
 
 
 @keeping()
 def local_responses(
-    u: Real, outputs: Real, fs: float, *, band: tuple[float, float], delays: Real, points: int = 400
+    u: Real,
+    outputs: Real,
+    fs: float,
+    *,
+    band: tuple[float, float],
+    delays: Real,
+    points: int = 400,
+    residual: bool = False,
 ) -> list[FrequencyResponse]:
     """Return the responses of many outputs to one input, each as `local_response` finds it.
 
@@ -107,7 +118,7 @@ def local_responses(
                 regressors = partial(Regressors.around, spectra.u, centre)
                 if alike.size > _AT_ONCE:
                     regressors = cache(regressors)
-            response, variance = _chosen(spectra, centre, regressors)
+            response, variance = _chosen(spectra, centre, regressors, residual=residual)
             frequency = spectra.frequency[centre]
             response = response * np.exp(-2j * np.pi * frequency * delays[some, None])
             for i, each, std in zip(some.tolist(), response, np.sqrt(variance), strict=True):
@@ -140,21 +151,27 @@ def _excited(u: Complex, centre: NDArray[np.int64]) -> Mask:
 
 
 def _chosen(
-    spectra: Spectra, centre: NDArray[np.int64], regressors: Callable[[int], Regressors]
+    spectra: Spectra,
+    centre: NDArray[np.int64],
+    regressors: Callable[[int], Regressors],
+    *,
+    residual: bool,
 ) -> tuple[Complex, Real]:
     """Response and variance at each centre, of each record.
 
-    Rational functions are fitted if the polynomials, which give their start, need narrow windows:
-    over the two widest windows first. Narrower windows follow, one by one, for records that do not
-    suffice with these: the narrowest so far, or a polynomial narrower than the next, is chosen at
-    many frequencies, or a bin of the residual exceeds the noise, whose power has an exponential
-    distribution.
+    The polynomials give the start of the rational functions, which are fitted over the two widest
+    windows, for a `residual` only if it is not noise: then the polynomials need narrow windows.
+    Narrower windows follow, one by one, for records that do not suffice with these: the narrowest
+    so far, or a polynomial narrower than the next, is chosen at many frequencies, or a bin of the
+    residual exceeds the noise, whose power has an exponential distribution.
     """
     widths, polynomials = _polynomials(spectra, centre)
     chosen, response, variance = choose(polynomials, ())
     rational = _rational_widths(centre, spectra.u.size)
-    # Two fits of each width: if wide polynomials suffice, no more is needed.
+    # There are two fits of each width. A response that is not a residual has poles.
     rough = (chosen < 2 * (len(widths) - 2)).mean(axis=-1) > PART
+    if not residual:
+        rough[:] = True
     if not rational or not rough.any():
         return response, variance
     polynomials = [fit.of(rough) for fit in polynomials]

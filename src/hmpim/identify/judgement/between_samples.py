@@ -35,9 +35,8 @@ def undetermined_between(
     moves = []
     for mode, apart, other in rivals:
         if other or abs(apart) > FEW:
-            model = f"a {structure_in_words(other)} model and " if other else ""
-            delay = f"a delay {abs(apart):.2f} samples {'longer' if apart > 0.0 else 'shorter'}"
-            moves.append(f"{INTERSAMPLE_WORDS[mode]}, with {model}{delay}")
+            model = f"{_a_model(other)} and " if other else ""
+            moves.append(f"{INTERSAMPLE_WORDS[mode]}, with {model}{_delay(apart)}")
     if not moves:
         return
     yield Finding(
@@ -49,6 +48,20 @@ def undetermined_between(
         severity="info",
         parameters=_SHIFTED,
     )
+
+
+def _a_model(structure: str) -> str:
+    """Name a structure, with its remark last: 'a first-order model (with a zero)'."""
+    name, _, remark = structure_in_words(structure).partition(" (")
+    return f"a {name} model" + (f" ({remark}" if remark else "")
+
+
+def _delay(apart: float) -> str:
+    """Compare a delay that is `apart` samples longer with the stated one."""
+    size = f"{abs(apart):.2f}"
+    if size == "0.00":
+        return "the same delay"
+    return f"a delay {size} samples {'longer' if apart > 0.0 else 'shorter'}"
 
 
 def wide_span(evidence: Evidence) -> Iterator[Finding]:

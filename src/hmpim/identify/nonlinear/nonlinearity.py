@@ -1,9 +1,8 @@
 """Whether the system is linear, and if not, in which way and by how much.
 
 A sweep shows a nonlinearity by its harmonics, any other input by how much better a nonlinear trace
-explains the residual. If there is one,
-`hmpim.identify.nonlinear.mechanisms` determines its kind. Dependence on the amplitude takes several
-records: `hmpim.identify.records.levels`.
+explains the residual. If there is one, `hmpim.identify.nonlinear.mechanisms` determines its kind.
+Dependence on the amplitude takes several records: `hmpim.identify.records.levels`.
 """
 
 from collections.abc import Sequence

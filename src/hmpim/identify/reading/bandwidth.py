@@ -15,7 +15,7 @@ from hmpim.identify.chance import DEVIATIONS, HALF
 from hmpim.identify.result import Estimate, FrequencyResponse, Parameters, ResponseBandwidths
 from hmpim.identify.result.error_bars import estimate
 from hmpim.identify.result.groups import BANDWIDTHS
-from hmpim.identify.worth import PART, TOLERATED
+from hmpim.identify.worth import INTERPOLATED, PART, TOLERATED
 from hmpim.model import RationalDelay, response
 from hmpim.model.discrete import discretise, fed_forward_response
 from hmpim.model.response import response_std
@@ -89,15 +89,18 @@ def beside_model(
 ) -> FrequencyResponse:
     """Return the response of an output: the model's, and that measured on the model's residual.
 
-    What a least-squares fit explains of the noise is independent of its residual, so the variances
-    add. The covariance is that of `hmpim.model.response.response_std`; a model of which it is
-    unknown adds none.
+    The model's error is independent of the residual. A large one also shows in the residual, so
+    that it adds no more than the local error does. The covariance is that of
+    `hmpim.model.response.response_std`; a model of which it is unknown adds none. No error is less
+    than that of interpolation.
     """
     modelled = sampled_response(system, left.frequency, fs=fs, intersample=intersample)
     std = left.std
     if np.isfinite(covariance).all():
-        std = np.hypot(std, response_std(system, covariance, left.frequency))
-    return replace(left, response=left.response + modelled, std=std)
+        own = response_std(system, covariance, left.frequency)
+        std = np.hypot(std, np.minimum(own, std))
+    total = left.response + modelled
+    return replace(left, response=total, std=np.maximum(std, INTERPOLATED * np.abs(total)))
 
 
 def _read_at(f: Real, ratio: Complex, std: Real, frequency: float) -> tuple[complex, float] | None:

@@ -1,4 +1,4 @@
-"""Measurements without a model: the frequency response, bandwidths, nonlinearity."""
+"""Measurements: the frequency response, bandwidths, nonlinearity."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
