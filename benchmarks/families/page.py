@@ -38,8 +38,8 @@ the table, `--list` describes each family, `--explain` compares one draw with it
   families. The errors of one record's figures are correlated, so the test is stricter than its
   level: a family that fails it is drawn again, 400 times (`--families NAME --draws 400 --seed 2`).
 - Measured off: draws whose measured response is off by more than 5 % and 5 standard deviations at
-  more than a twentieth of its points. For a held input, the response from samples to samples
-  counts as true as well.
+  more than a twentieth of its points. For a held or linear input, the response from samples to
+  samples counts as true as well.
 
 What "right" means in special cases: the true figures of a clipped, rounded, drifting or noisy
 record are those of the linear system, and its bias is the mean over the record. A slew limit, dead
