@@ -131,7 +131,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if spans_record(former.best) or not is_slow(former.problem, former.best):
         return None
 
-    found = with_plain_drift(former.problem.y.size, begun, fitted)
+    found = with_plain_drift(former.problem, former.best, begun, fitted)
     if found is None:
         return None
     joint, drifting = found
@@ -244,7 +244,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         plain = fit_once(question, seen, question.plain, rows, begun=known)
         return plain.fits[asked]
 
-    found = with_plain_drift(first.problem.y.size, begun, fitted)
+    found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
     if found is None or not found[0].related:
         return None
     steady = fit_once(question, seen, question.plain, begun=led)

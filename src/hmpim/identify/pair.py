@@ -351,8 +351,14 @@ def _measured(own: _Followed, joint: JointFit, readings: Readings) -> FrequencyR
         left = local_response(u, fit.residual, fs, delay=late, band=own.band, residual=True)
     else:
         left = own.matrix.columns[own.i]
-    covariance, between = readings.coefficient_covariance, joint.best.intersample
-    return beside_model(left, readings.system, covariance, fs=fs, intersample=between)
+    return beside_model(
+        left,
+        readings.system,
+        readings.coefficient_covariance,
+        fs=fs,
+        intersample=joint.best.intersample,
+        whole=own.found.counting(np.asarray(question.output.valid), fs) is None,
+    )
 
 
 def _spread(joint: JointFit) -> float:

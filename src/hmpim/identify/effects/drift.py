@@ -23,7 +23,7 @@ from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.noise.covariance import covariance
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.worth import PART, TWICE
+from hmpim.identify.worth import MOST, PART, TWICE
 from hmpim.record import Finding
 
 __all__ = ["Drifting", "drift_findings", "drift_rows", "is_slow", "with_drift", "with_plain_drift"]
@@ -85,19 +85,28 @@ def with_drift(first: JointFit, fitted: _Fitted) -> tuple[JointFit, Drifting | N
 
 
 def with_plain_drift(
-    size: int, begun: _Begun, fitted: Callable[[Real], JointFit]
+    problem: Problem, fit: Fit, begun: _Begun, fitted: Callable[[Real], JointFit]
 ) -> tuple[JointFit, Drifting] | None:
-    """Add a drift to plain dynamics of `size` samples, if that leaves white noise; else None.
+    """Add a drift to plain dynamics; keep it if that leaves white noise.
 
-    `begun` makes the plain fits with rows for the drift and returns the best of them and its data;
-    `fitted` makes the joint fit of plain structures. The values are as for `with_drift`.
+    `problem` and `fit` are the data and the best plain fit with a constant bias. `begun` makes the
+    plain fits with rows for the drift and returns the best of them and its data; `fitted` makes the
+    joint fit of plain structures. The values are as for `with_drift`.
+
+    None if a constant bias is enough, if the model is as slow as a drift, or if the residual is not
+    white.
     """
-    every = drift_rows(size)
+    every = drift_rows(problem.y.size)
     data, free = begun(every)
-    if data.counted < _FEWEST or not free.is_white:
+    if data.counted < max(_FEWEST, MOST * problem.counted) or not free.is_white:
         return None
     columns = _shape(data, free, every)
-    return _without_drift(fitted(columns), columns)
+    joint = fitted(columns)
+    if spans_record(joint.best.fit) or not is_white(joint.best.fit.residual):
+        return None
+    if criterion_gain(joint, len(columns), fit, problem) < 0.0:
+        return None
+    return _without_drift(joint, columns)
 
 
 def _without_drift(joint: JointFit, columns: Real) -> tuple[JointFit, Drifting]:

@@ -86,19 +86,20 @@ def beside_model(
     *,
     fs: float,
     intersample: Intersample,
+    whole: bool = True,
 ) -> FrequencyResponse:
     """Return the response of an output: the model's, and that measured on the model's residual.
 
     The model's error is independent of the residual. A large one also shows in the residual, so
-    that it adds no more than the local error does. The covariance is that of
-    `hmpim.model.response.response_std`; a model of which it is unknown adds none. No error is less
-    than that of interpolation.
+    that it adds no more than the local error does, if the `whole` record counts. The covariance is
+    that of `hmpim.model.response.response_std`; a model of which it is unknown adds none. No error
+    is less than that of interpolation.
     """
     modelled = sampled_response(system, left.frequency, fs=fs, intersample=intersample)
     std = left.std
     if np.isfinite(covariance).all():
         own = response_std(system, covariance, left.frequency)
-        std = np.hypot(std, np.minimum(own, std))
+        std = np.hypot(std, np.minimum(own, std) if whole else own)
     total = left.response + modelled
     return replace(left, response=total, std=np.maximum(std, INTERPOLATED * np.abs(total)))
 
