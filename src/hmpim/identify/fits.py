@@ -135,9 +135,7 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     if found is None:
         return None
     joint, drifting = found
-    best = joint.best.fit  # richer dynamics may explain the slow part
-    tail = hidden_tail(joint.weighed, best, share=joint.weighed_share)
-    if follows(course.data, best) or tail is not None:
+    if follows(course.data, joint.best.fit) or _leaves_tail(joint):
         return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
@@ -224,6 +222,11 @@ class _WithRows:
         return OutputFit(fits=(joint,))
 
 
+def _leaves_tail(joint: JointFit) -> bool:
+    """Whether a slow tail is missing, so that richer dynamics may explain what the drift does."""
+    return hidden_tail(joint.weighed, joint.best.fit, share=joint.weighed_share) is not None
+
+
 def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
@@ -245,7 +248,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
         return plain.fits[asked]
 
     found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
-    if found is None or not found[0].related:
+    if found is None or not found[0].related or _leaves_tail(found[0]):
         return None
     steady = fit_once(question, seen, question.plain, begun=led)
     former = steady.fits[asked]

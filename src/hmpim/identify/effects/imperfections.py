@@ -50,6 +50,7 @@ class Imperfections:
     spikes: Mask | None = None
     frozen: Mask | None = None
     repeated: Mask | None = None
+    unsure: Mask | None = None  # may be copies of samples that are lost
     levels: int | None = None
 
     def counts_other_samples_than(self, before: "Imperfections") -> bool:
@@ -62,7 +63,8 @@ class Imperfections:
     @property
     def lost(self) -> Mask | None:
         """Samples without information: spikes, copies, and standstills."""
-        masks = [mask for mask in (self.spikes, self.frozen, self.repeated) if mask is not None]
+        every = (self.spikes, self.frozen, self.repeated, self.unsure)
+        masks = [mask for mask in every if mask is not None]
         return np.logical_or.reduce(masks) if masks else None
 
     @property
@@ -130,6 +132,9 @@ def find_imperfections(
         beyond = None if clipping is None else clipping.clipped
         spikes = find_spikes(y, prediction, clipped=beyond)
     repeated = find_repeated(y) if rounding is None and hold is None else None
+    unsure = None
+    if repeated is not None and valid is not None:  # a sample after a gap may be a copy
+        unsure = np.asarray(valid & ~np.concatenate([[True], valid[:-1]]))
     return Imperfections(
         saturation=clipping,
         hold=hold,
@@ -137,6 +142,7 @@ def find_imperfections(
         spikes=spikes,
         frozen=frozen,
         repeated=repeated,
+        unsure=unsure,
         levels=_few_levels(y, inputs),
     )
 
