@@ -170,6 +170,8 @@ def turn_ahead(course: Course) -> Course:
     counted[rough.earliest :] = False  # they answer input after the record
     shorter = replace(seen, valid=counted)
     count = np.count_nonzero(counted)
+    if count < PART * level.size:
+        return course
     problem, power = ahead.problem(course.natural, shorter), best.objective / course.problem.counted
     found = fit_plain(problem, rough, course.plain or PLAIN, largest=power * count)
     if TWICE * min(f.objective for f in found) > power * count:
