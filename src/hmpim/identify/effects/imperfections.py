@@ -36,6 +36,9 @@ __all__ = ["Imperfections", "find_imperfections", "refine"]
 _FEWEST_LEVELS = 8
 """Fewest different values of an output, unless its input takes as few."""
 
+_HEAD = 64
+"""First samples, in which most outputs already take more values: a quick test."""
+
 _ROUNDS = 3
 """Searches for spikes after the censored fit: large ones hide smaller ones."""
 
@@ -156,7 +159,7 @@ def _sides(saturation: Saturation | None) -> tuple[bool, bool]:
 
 def _few_levels(y: Real, inputs: Sequence[Real]) -> int | None:
     """Number of values of the output, if it is small compared with the inputs'."""
-    if not inputs:
+    if not inputs or np.unique(y[:_HEAD]).size >= _FEWEST_LEVELS:
         return None
     levels = np.unique(y).size
     few = levels < _FEWEST_LEVELS and max(np.unique(u).size for u in inputs) > 2 * levels
@@ -284,8 +287,8 @@ def _worth_refining(joint: JointFit, found: Imperfections) -> list[Trial]:
 
 def _gaps_only(problem: Problem, found: Imperfections, fs: float) -> Mask:
     """Samples that count, with clipped and held ones included again."""
-    whole = np.ones(problem.y.size, dtype=bool)
+    whole = np.ones(problem.y.size, dtype=bool) if problem.valid is None else problem.valid
     shown, lost = found.informative(problem.y.size, fs), found.lost
-    if problem.valid is not None and shown is not None:
-        whole = np.asarray(problem.valid | ~shown)
+    if shown is not None:
+        whole = np.asarray(whole | ~shown)
     return whole if lost is None else np.asarray(whole & ~lost)
