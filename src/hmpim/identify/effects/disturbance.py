@@ -22,6 +22,8 @@ def criterion_gain(joint: JointFit, count: int, former: Fit, without: Problem) -
         counts[: begins or 0] = False
         if problem.valid is not None:
             counts &= problem.valid
+    if not counts.any():
+        return -np.inf
     fit, samples = joint.best.fit, int(np.count_nonzero(counts))
     gained = 2.0 * innovation_gain(former.residual[counts], fit.residual[counts])
     unknown = fit.structure.parameters + count - former.structure.parameters

@@ -202,11 +202,11 @@ def _settled(first: JointFit, begin: Scored, fitted: _Fitted, *, plainly: bool =
             again = scored(data, constant, data.counted, rates=rates)
             score = max(again, key=lambda one: one.gain, default=score)
             rates = tuple(score.rate * spread ** np.linspace(-1.0, 1.0, _FINELY))
-        # Compared with the residual of the undivided output, whose noise is even.
-        even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
-        whole = replace(joint, best=even)
-        gained = criterion_gain(whole, len(score.rows), first.best.fit, first.problem)
         spread **= 2.0 / (_FINELY - 1)
+    # Compared with the residual of the undivided output, whose noise is even.
+    even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
+    whole = replace(joint, best=even)
+    gained = criterion_gain(whole, len(score.rows), first.best.fit, first.problem)
     return _Settled(
         joint=joint,
         score=replace(score, std=_deviation(data, constant, score)),

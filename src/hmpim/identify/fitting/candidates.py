@@ -12,9 +12,9 @@ from hmpim.identify.fitting.data import TASTE, Data, hopeless_beside, refit
 from hmpim.identify.fitting.enrich import (
     INTEGRATING,
     MODES,
-    PLAIN,
     RICH,
     Proposal,
+    integrator_starts,
     members,
     proposals,
     with_fit,
@@ -258,8 +258,7 @@ def fit_integrating(
             running_sum = np.cumsum(data.u - data.u[0])
             rough = rough_response(running_sum, data.y, longest_delay=longest_lag(data.y.size))
         rivals = [*fits, *found]
-        rest = STRUCTURES[PLAIN[structure.order]]  # without the integrator
-        starts = [*_grown(structure, rivals), *starting_values(rough, rest)]
+        starts = [*_grown(structure, rivals), *integrator_starts(rough, structure)]
         found.append(best_of(problem, structure, starts, rivals))
     return found
 

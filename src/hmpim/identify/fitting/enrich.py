@@ -12,7 +12,7 @@ import numpy as np
 from hmpim.identify.arrays import Complex, Real
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly, reweighted
-from hmpim.identify.fitting.start import RoughResponse
+from hmpim.identify.fitting.start import RoughResponse, starting_values
 from hmpim.identify.worth import FEW, PART
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName, theta_of
 
@@ -22,6 +22,7 @@ __all__ = [
     "PLAIN",
     "RICH",
     "Proposal",
+    "integrator_starts",
     "is_response",
     "members",
     "proposals",
@@ -57,6 +58,19 @@ INTEGRATING: tuple[StructureName, ...] = (
 
 _DELAYS = 7
 """Number of delays to start from, around that of the best fit so far."""
+
+
+def integrator_starts(rough: RoughResponse, structure: Structure) -> list[Real]:
+    """Starts for an integrator: those of its other poles, from the input's running sum.
+
+    Parameters
+    ----------
+    rough : RoughResponse
+        From the running sum of the input to the output.
+    structure : Structure
+        An integrator, alone or with other poles.
+    """
+    return starting_values(rough, STRUCTURES[PLAIN[structure.order]])  # one for each order
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

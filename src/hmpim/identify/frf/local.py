@@ -168,10 +168,9 @@ def _chosen(
     widths, polynomials = _polynomials(spectra, centre)
     chosen, response, variance = choose(polynomials, ())
     rational = _rational_widths(centre, spectra.u.size)
-    # There are two fits of each width. A response that is not a residual has poles.
-    rough = (chosen < 2 * (len(widths) - 2)).mean(axis=-1) > PART
-    if not residual:
-        rough[:] = True
+    rough = np.ones(spectra.y.shape[0], dtype=bool)
+    if residual:  # there are two fits of each width
+        rough = (chosen < 2 * (len(widths) - 2)).mean(axis=-1) > PART
     if not rational or not rough.any():
         return response, variance
     polynomials = [fit.of(rough) for fit in polynomials]

@@ -10,13 +10,13 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM, LIKELIER, SEARCHED
 from hmpim.identify.fitting.course import Course, begun, looks_held
 from hmpim.identify.fitting.data import Counted, Data, refit
-from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN, members
+from hmpim.identify.fitting.enrich import INTEGRATING, integrator_starts, members
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.rows import Part
-from hmpim.identify.fitting.start import RoughResponse, starting_values
+from hmpim.identify.fitting.start import RoughResponse
 from hmpim.identify.fitting.trial import JointFit, schwarz
 from hmpim.identify.noise.misfit import Misfit
 from hmpim.identify.statistics.beyond import beyond_of, has_cubes
@@ -27,7 +27,7 @@ from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.start import excited, rough_of
 from hmpim.identify.statistics.statistics import Statistics
 from hmpim.identify.worth import TWICE
-from hmpim.model.dynamics import STRUCTURES, StructureName
+from hmpim.model.dynamics import StructureName
 from hmpim.record import Intersample
 
 __all__ = ["CompressedData", "choose", "integrator_of"]
@@ -185,7 +185,7 @@ def integrator_of(statistics: Statistics, data: CompressedData, joint: JointFit)
     problem, count = data.problem(mode, _ALL), data.products.counted
     hopeless = TWICE * best.left.power * count
     for structure in members(INTEGRATING, INTEGRATING):
-        starts = starting_values(rough, STRUCTURES[PLAIN[structure.order]])
+        starts = integrator_starts(rough, structure)
         fits = [fit_structure(problem, structure, theta, iterations=_TASTE) for theta in starts]
         start = min(fits, key=lambda fit: fit.objective).theta
         fit = as_fitted(fit_structure(problem, structure, start, hopeless=hopeless))
