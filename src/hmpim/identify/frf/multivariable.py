@@ -8,8 +8,9 @@ different times turn their phases differently from bin to bin there, which separ
 responses. Without this difference no response is given.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 import scipy
@@ -118,8 +119,9 @@ def joint_response(
     _refuse_identical(inputs, low, high, names[:-1])
     centre = centres_in_band(low, high, _POINTS)
     moved = _moved(inputs, delay * fs, base)
-    coherence = _chosen(moved, y[base:], centre)[-1]
-    response, variance, condition, _ = _chosen(moved, (y - predicted)[base:], centre)
+    around = cache(partial(Regressors.around, moved, centre))
+    coherence = _chosen(moved, y[base:], centre, around)[-1]
+    response, variance, condition, _ = _chosen(moved, (y - predicted)[base:], centre, around)
     frequency = centre * step
     usable = np.maximum(_input_condition(moved, centre), condition) <= _WORST
     response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
@@ -193,12 +195,14 @@ def _moved(u: Real, late: float, base: int) -> Complex:
     return spectra
 
 
-def _chosen(u: Complex, y: Real, centre: Integer) -> tuple[Complex, Real, Real, Real]:
+def _chosen(
+    u: Complex, y: Real, centre: Integer, around: Callable[..., Regressors]
+) -> tuple[Complex, Real, Real, Real]:
     """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1)."""
     spectrum = np.array(scipy.fft.rfft(y))[: u.shape[1]]
     spectrum[0] = 0.0
     widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
-    polynomials = [fit for width in widths for fit in _fits(u, spectrum, centre, width, None)]
+    polynomials = [fit for width in widths for fit in _fits(around, spectrum, width, None)]
     _, (g,), _ = choose([fit.local for fit in polynomials], [])
     inside = np.arange(centre[0], centre[-1] + 1)
     smooth = spectrum.copy()
@@ -206,7 +210,7 @@ def _chosen(u: Complex, y: Real, centre: Integer) -> tuple[Complex, Real, Real, 
         u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
     )
     widths = _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
-    rationals = [fit for width in widths for fit in _fits(u, spectrum, centre, width, smooth)]
+    rationals = [fit for width in widths for fit in _fits(around, spectrum, width, smooth)]
     local = [[fit.local for fit in fits] for fits in (polynomials, rationals)]
     best, response, variance = choose(*local)
     tried = (*polynomials, *rationals)
@@ -228,11 +232,11 @@ def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tup
 
 
 def _fits(
-    u: Complex, y: Complex, centre: Integer, width: int, smooth: Complex | None
+    around: Callable[..., Regressors], y: Complex, width: int, smooth: Complex | None
 ) -> list[_Joint]:
     """Fit with T and without: rational functions if `smooth` is given to start from."""
     order = _ORDER if smooth is None else TRANSIENT_ORDER
-    own = Regressors.around(u, centre, width, transient=order)
+    own = around(width, transient=order)
     outputs = own.views(y[None])
     found = []
     for columns in (own.both, own.plain):
