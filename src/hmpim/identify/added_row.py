@@ -7,7 +7,7 @@ from operator import itemgetter
 import numpy as np
 
 from hmpim.identify.arrays import Real, count_alike
-from hmpim.identify.chance import CLEARLY, LIKELIER
+from hmpim.identify.chance import CLEARLY, DEVIATIONS, LIKELIER
 from hmpim.identify.coupling.output_fit import OutputFit
 from hmpim.identify.coupling.pairs import contribution
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
@@ -18,6 +18,7 @@ from hmpim.identify.fitting.course import Course, completed, resumed, turn_ahead
 from hmpim.identify.fitting.data import Counted, polished, refit
 from hmpim.identify.fitting.derivatives import jacobian
 from hmpim.identify.fitting.fit import Fit, Problem
+from hmpim.identify.fitting.growth import hidden_pole
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.plainer import taking
 from hmpim.identify.fitting.trial import JointFit
@@ -90,7 +91,11 @@ def fit_bent(question: Question, seen: Imperfections, course: Course) -> OutputF
     joint = chosen_of(replace(course, others=()), question.plain, growing=False)
     plainly = replace(question, structures=question.plain)
     fitted = add_row(plainly, seen, OutputFit(fits=(joint,), begun=course))
-    return None if fitted.bending is None else fitted
+    if fitted.bending is None:
+        return None
+    (bent,) = fitted.fits
+    missed = hidden_pole(bent.problem, bent.best.fit)
+    return fitted if abs(missed.squared) < DEVIATIONS * missed.std else None
 
 
 def fit_with_row(

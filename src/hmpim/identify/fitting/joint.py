@@ -35,7 +35,7 @@ from hmpim.identify.fitting.data import Fits, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
 from hmpim.identify.fitting.fit import Fit
-from hmpim.identify.fitting.growth import grow
+from hmpim.identify.fitting.growth import HiddenPole, grow, one_more_pole
 from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
@@ -215,8 +215,46 @@ def _looked_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Tr
 
 
 def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
-    """Add poles that the likelihood supports, and record what it leaves open."""
-    mode = joint.best.intersample
+    """Add poles that the likelihood supports, and record what it leaves open.
+
+    Half a sample of delay, or a zero, may have replaced a missing pole: so poles are also added to
+    other trials, and the likeliest result leads.
+    """
+    grown, rivals, hidden = _grown_from(joint, joint.best, course, structures)
+    leading, found = (joint.best, *grown)[-1], [*joint.trials, *grown]
+    for trial in _others_to_grow(joint, course.natural):
+        grown, further, test = _grown_from(joint, trial, course, structures)
+        found += grown
+        if grown and grown[-1].criterion < leading.criterion:
+            leading, rivals, hidden = grown[-1], further, test
+    joint = replace(joint, trials=tuple(found), rivals=rivals, hidden=hidden)
+    return joint if leading is joint.best else _with_leading(leading, joint, course)
+
+
+def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
+    """The likeliest natural trials without zeros and with them, except the best itself.
+
+    If the best has zeros, instead of it the one with a pole fewer: a fit with zeros from its own
+    start may have ended elsewhere.
+    """
+    own, most = joint.best.fit.structure, TWICE * joint.best.fit.objective
+    hopeful = [t for t in joint.trials if t.intersample == natural and t.fit.objective < most]
+    hopeful = [t for t in hopeful if t.fit.structure.integrators == own.integrators]
+    found = []
+    for with_zeros in (False, True):
+        alike = [t for t in hopeful if bool(t.fit.structure.zeros) == with_zeros]
+        if joint.best in alike:
+            alike = [t for t in alike if with_zeros and one_more_pole(t.fit.structure) == own]
+        if alike:
+            found.append(min(alike, key=lambda trial: trial.criterion))
+    return found
+
+
+def _grown_from(
+    joint: JointFit, trial: Trial, course: Course, structures: tuple[StructureName, ...]
+) -> tuple[tuple[Trial, ...], tuple[Trial, ...], HiddenPole]:
+    """Add poles to a trial: trials that beat one another, rivals, and the test of the last one."""
+    mode = trial.intersample
     problem = course.data.problem(mode, course.counted)
     count = problem.counted * joint.weighed_share
 
@@ -228,7 +266,7 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
 
     growth = grow(
         problem,
-        joint.best.fit,
+        trial.fit,
         hidden=course.data.hidden_pole,
         count=count,
         names=structures,
@@ -237,8 +275,7 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
     grown, rivals = (
         tuple(trial_of(mode, fit, count) for fit in fits) for fits in (growth.grown, growth.rivals)
     )
-    joint = replace(joint, trials=(*joint.trials, *grown), rivals=rivals, hidden=growth.hidden)
-    return _with_leading(grown[-1], joint, course) if grown else joint
+    return grown, rivals, growth.hidden
 
 
 def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
