@@ -253,10 +253,10 @@ def _followed(
     if not holding:
         fits += [fit for structure in tried for fit in _walked(problem, structure, fits)]
     least = min(fits, key=lambda fit: fit.cost)
-    count, most = problem.counted * least.share, TWICE * least.cost
+    count = problem.counted * least.share
     for i in sorted(range(len(fits)), key=lambda i: fits[i].cost):
         fit = fits[i]
-        if fit.structure.order and fit.cost <= most:
+        if fit.structure.order and fit.cost <= TWICE * least.cost:
             likely = _as_likely(fit.structure, fits, count)
             fits[i] = refit(problem, fit, precision=problem.final, hopeless=likely)
     return fits
