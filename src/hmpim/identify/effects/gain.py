@@ -118,10 +118,10 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     begin, share = _first_scores(first, otherwise)
     if not begin:
         return None
-    lead = _tried(first, begin, fitted)
+    lead = max(_tried(first, begin, fitted), key=lambda one: one.gained)
     plain = lead.white or best.structure.name in PLAIN
     if not plain:
-        lead = _tried(first, begin, None)
+        lead = _settled(first, lead.score, None)
     score = lead.score
     if abs(score.change) <= max(WORTH, DEVIATIONS * score.std):
         return None
@@ -169,12 +169,11 @@ class _Settled:
         return is_white(self.joint.problem.counting(self.joint.best.fit.residual))
 
 
-def _tried(first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted | None) -> _Settled:
-    """The likelier of the fits with a steady change and one that settles."""
+def _tried(first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted) -> list[_Settled]:
+    """Plain fits with a steady change and one that settles."""
     steady = [score for score in begin if not score.rate]
     settling = sorted((score for score in begin if score.rate), key=lambda score: -score.gain)
-    tried = [_settled(first, score, fitted) for score in (*steady[:1], *settling[:1])]
-    return max(tried, key=lambda one: one.gained)
+    return [_settled(first, score, fitted) for score in (*steady[:1], *settling[:1])]
 
 
 def _is_clear(lead: _Settled, y: Real) -> bool:
