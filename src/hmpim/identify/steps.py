@@ -89,13 +89,10 @@ def let_gain_change(question: Question, seen: Imperfections, fitted: OutputFit) 
     def begun() -> Course:
         return turn_ahead(started(steady, seen, known))
 
-    def with_rows(y: Real, rows: Real, plainly: bool) -> JointFit:
+    def with_rows(y: Real, rows: Real) -> JointFit:
         rows = rows if known is None else np.vstack([known, rows])
         course = replace(begun(), data=replace(begun().data, y=y))
-        course = continued(course, valid=valid, nuisance=rows)
-        if plainly:
-            return chosen_of(course, question.plain)
-        return chosen_of(replace(course, others=begun().others), question.structures)
+        return chosen_of(continued(course, valid=valid, nuisance=rows), question.plain)
 
     def bent(problem: Problem, constant: Fit) -> float:
         u, between = aligned.inputs[0].values, joint.best.intersample

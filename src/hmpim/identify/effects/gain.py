@@ -21,7 +21,7 @@ from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import inverted, projected, scores
 from hmpim.identify.fitting.rows import Part
 from hmpim.identify.fitting.sampled_rows import SampledPart, part_of
-from hmpim.identify.fitting.trial import JointFit
+from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.worth import WORTH
 
@@ -55,7 +55,7 @@ _ALIKE = 1e-8
 """Least share of a row's power that the fit's other derivatives must not explain."""
 
 
-_Fitted = Callable[[Real, Real, bool], JointFit]
+_Fitted = Callable[[Real, Real], JointFit]
 _Share = Callable[[Problem, Fit], float]
 
 
@@ -106,9 +106,9 @@ class Scored:
 def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainChange | None:
     """Test whether the gain changes along the record.
 
-    `first` has a constant gain. `fitted` makes the joint fit to another output with more rows, of
-    plain structures only if its third argument is true. `otherwise` returns the share of a fit's
-    residual that something else explains, such as a nonlinearity.
+    `first` has a constant gain. `fitted` makes the joint fit of plain structures to another output
+    with more rows. `otherwise` returns the share of a fit's residual that something else explains,
+    such as a nonlinearity.
 
     None if no change is significant, or if something else explains more.
     """
@@ -119,20 +119,15 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
     if not begin:
         return None
     lead = max(_tried(first, begin, fitted), key=lambda one: one.gained)
-    fit = lead.joint.best.fit
-    data = _without_rows(lead.joint.problem, len(lead.score.rows), first.problem.y)
-    constant = fit_structure(data, fit.structure, fit.theta)
-    elsewhere = _gain_elsewhere(data, constant, tuple(sorted({0.0, lead.score.rate})))
-    if not lead.white and best.structure.name not in PLAIN:
-        lead = _settled(first, lead.score, fitted, plainly=False)
+    plain = lead.white or best.structure.name in PLAIN
+    if not plain:
+        lead = _settled(first, lead.score, None)
     score = lead.score
     if abs(score.change) <= max(WORTH, DEVIATIONS * score.std):
         return None
     # The change is only a doubt with rich dynamics, where it may replace a missing pole, and if a
     # change of the delay or the dynamics explains about as much.
-    plain = lead.joint.best.fit.structure.name in PLAIN
-    clear = score.gain > elsewhere + CLEARLY
-    taken = lead.gained > 2 * CLEARLY and lead.white and plain and clear
+    taken = lead.white and plain and lead.gained > 2 * CLEARLY and _is_clear(lead, first.problem.y)
     return GainChange(
         joint=lead.joint,
         taken=taken,
@@ -181,22 +176,41 @@ def _tried(first: JointFit, begin: tuple[Scored, ...], fitted: _Fitted) -> list[
     return [_settled(first, score, fitted) for score in (*steady[:1], *settling[:1])]
 
 
-def _settled(first: JointFit, begin: Scored, fitted: _Fitted, *, plainly: bool = True) -> _Settled:
+def _is_clear(lead: _Settled, y: Real) -> bool:
+    """Whether a change of the delay or the dynamics explains much less of the output y, (n,)."""
+    fit, score = lead.joint.best.fit, lead.score
+    data = _without_rows(lead.joint.problem, len(score.rows), y)
+    constant = fit_structure(data, fit.structure, fit.theta)
+    elsewhere = _gain_elsewhere(data, constant, tuple(sorted({0.0, score.rate})))
+    return score.gain > elsewhere + CLEARLY
+
+
+def _settled(first: JointFit, begin: Scored, fitted: _Fitted | None) -> _Settled:
     """Make the joint fit with a change of one shape.
 
     The output is divided by the gain so far, so that the row explains little. Its exact
-    form, and the assumption between the samples, then do not matter.
+    form, and the assumption between the samples, then do not matter. The change converges with the
+    plain structure that leads; then all of these are `fitted`. If None, with the structure of
+    `first` throughout.
     """
     y, score, spread = first.problem.y, begin, _STEP
-    fit, problem = first.best.fit, first.problem
-    for _ in range(_ROUNDS):
+    problem, best = first.problem, first.best
+    fit, near = best.fit, best if fitted is None else _plain(first)
+    for turn in range(_ROUNDS):
         course = np.maximum(1.0 + score.change * score.shape, _LEAST)
         # The output at the input's initial level does not change with the gain.
         initial = part_of(problem, fit.structure, fit.theta).level
         level = float(fit.linear[-1] + fit.linear[0] * initial)
-        joint = fitted(level + (y - level) / course, score.rows, plainly)
+        even, rows = level + (y - level) / course, score.rows
+        if fitted is None or turn < _ROUNDS - 1:
+            nuisance = np.vstack([first.problem.fixed()[1:], rows])
+            problem = replace(first.problem, y=even, nuisance=nuisance)
+            near = replace(near, fit=fit_structure(problem, near.fit.structure, near.fit.theta))
+            joint = replace(first, problem=problem, best=near)
+        else:
+            joint = fitted(even, rows)
         fit, problem = joint.best.fit, joint.problem
-        data, constant = _undivided(joint, score.rows, y)
+        data, constant = _undivided(joint, rows, y)
         rates = (score.rate,)
         for _ in range(2 if begin.rate else 1):
             again = scored(data, constant, data.counted, rates=rates)
@@ -204,9 +218,9 @@ def _settled(first: JointFit, begin: Scored, fitted: _Fitted, *, plainly: bool =
             rates = tuple(score.rate * spread ** np.linspace(-1.0, 1.0, _FINELY))
         spread **= 2.0 / (_FINELY - 1)
     # Compared with the residual of the undivided output, whose noise is even.
-    even = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
-    whole = replace(joint, best=even)
-    gained = criterion_gain(whole, len(score.rows), first.best.fit, first.problem)
+    even_noise = replace(joint.best, fit=replace(fit, residual=fit.residual * course))
+    whole = replace(joint, best=even_noise)
+    gained = criterion_gain(whole, len(score.rows), best.fit, first.problem)
     return _Settled(
         joint=joint,
         score=replace(score, std=_deviation(data, constant, score)),
@@ -214,6 +228,14 @@ def _settled(first: JointFit, begin: Scored, fitted: _Fitted, *, plainly: bool =
         course=course,
         level=level,
     )
+
+
+def _plain(joint: JointFit) -> Trial:
+    """The likeliest trial of a plain structure; the best one where none was tried."""
+    plain = [trial for trial in joint.trials if trial.fit.structure.name in PLAIN]
+    if joint.best.fit.structure.name in PLAIN or not plain:
+        return joint.best
+    return min(plain, key=lambda trial: trial.criterion)
 
 
 def scored(

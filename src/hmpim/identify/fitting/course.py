@@ -182,12 +182,15 @@ def turn_ahead(course: Course) -> Course:
 def free_from_wander(course: Course) -> Course:
     """Fit the plain structures with the noise whitened, where its colour hides the response.
 
-    Not where the best fit has a pole as slow as the record: its wander is the response.
+    Not where the best fit has a pole as slow as the record: its wander is the response. Nor where
+    a test in noise of any colour finds no response either.
     """
     if almost_integrates(course.best):
         return course
     whitened = prewhitened_of(course.data, course.natural, course.fits, course.given)
     if whitened is None or is_response(course.data.rough, course.best):
+        return course
+    if is_unanswered(course, [(course.natural, fit) for fit in course.fits]):
         return course
     problem = whitened.problem(course.natural, course.given)
     free = fit_plain(problem, whitened.rough, course.plain or PLAIN)

@@ -15,8 +15,9 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.data import polished, refit
+from hmpim.identify.fitting.data import refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -251,11 +252,24 @@ def _followed(
             fits.append(fit)
     if not holding:
         fits += [fit for structure in tried for fit in _walked(problem, structure, fits)]
-    least = min(fit.cost for fit in fits)
-    for i, fit in enumerate(fits):
-        if fit.structure.order and fit.cost <= TWICE * least:
-            fits[i] = polished(problem, fit)
+    least = min(fits, key=lambda fit: fit.cost)
+    count = problem.counted * least.share
+    for i in sorted(range(len(fits)), key=lambda i: fits[i].cost):
+        fit = fits[i]
+        if fit.structure.order and fit.cost <= TWICE * least.cost:
+            likely = _as_likely(fit.structure, fits, count)
+            fits[i] = refit(problem, fit, precision=problem.final, hopeless=likely)
     return fits
+
+
+def _as_likely(structure: Structure, fits: list[Fit], count: float) -> float:
+    """Largest sum of squares with which a structure is about as likely as the likeliest fit."""
+    price = float(np.log(count)) / count
+    paid = (
+        fit.cost * float(np.exp(price * (fit.structure.parameters - structure.parameters)))
+        for fit in fits
+    )
+    return min(paid) * float(np.exp(2 * CLEARLY / count))
 
 
 def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:

@@ -157,13 +157,12 @@ def kinds_in_question(
             continue
         seen = bends(command.u, problem, fit, intersample=command.intersample)
         kinds = [one.kind for one in seen if one.certain]
+        # Where a linear fit leaves white noise, a nonlinearity must explain about as much.
+        rest = (1.0 - seen[0].share) * fit.cost if seen else np.inf
+        if best.is_white and rest > TWICE * best.cost:
+            continue
         if fit.structure.name in _SERVOS:
-            alike = any(kind in ALIKE for kind in kinds)
-            # Where a linear fit leaves white noise, friction must explain about as much.
-            rest = (1.0 - seen[0].share) * fit.cost if seen else np.inf
-            kinds = (
-                ["friction"] if alike and (not best.is_white or rest < TWICE * best.cost) else []
-            )
+            kinds = ["friction"] if any(kind in ALIKE for kind in kinds) else []
         for kind in dict.fromkeys(kinds):
             found.setdefault(kind, []).append(fit)
     return found
