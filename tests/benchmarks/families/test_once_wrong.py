@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from families.catalogue import BESIDE_ANOTHER, FAMILIES
-from families.kinds import lagging_integrator, sequence
+from families.kinds import lagging_integrator, sequence, set_samples
 from families.study import draw_of, identified, one
 from families.take import finish, shoot
 
@@ -82,6 +82,21 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
 )
 def test_a_draw_that_was_doubted_and_wrong_is_right(family, seed, index):
     assert one(family, seed, index, True).cell == "right_ok"
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        0,  # a linear input stood in for a fifth pole
+        5,  # two zeros did for a fourth
+        6,  # backlash did for a third and a fourth
+    ],
+)
+def test_a_long_record_shows_all_poles(index):
+    try:
+        assert one("Bessel", 1183, index, True, samples=10_000).cell == "right_ok"
+    finally:
+        set_samples(None)
 
 
 def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():

@@ -153,9 +153,9 @@ def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
     return np.asarray(theta + sooner * (np.arange(theta.size) == 0))
 
 
-def polished(problem: Problem, fit: Fit) -> Fit:
-    """The same fit at the final precision."""
-    return refit(problem, fit, precision=problem.final)
+def polished(problem: Problem, fit: Fit, *, hopeless: float = np.inf) -> Fit:
+    """The same fit at the final precision; given up once it cannot get below `hopeless`."""
+    return refit(problem, fit, precision=problem.final, hopeless=hopeless)
 
 
 def refit_all(

@@ -17,7 +17,7 @@ import scipy
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.beginning import begins_of
-from hmpim.identify.fitting.data import refit
+from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
@@ -257,8 +257,7 @@ def _followed(
     for i in sorted(range(len(fits)), key=lambda i: fits[i].cost):
         fit = fits[i]
         if fit.structure.order and fit.cost <= TWICE * least.cost:
-            likely = _as_likely(fit.structure, fits, count)
-            fits[i] = refit(problem, fit, precision=problem.final, hopeless=likely)
+            fits[i] = polished(problem, fit, hopeless=_as_likely(fit.structure, fits, count))
     return fits
 
 
