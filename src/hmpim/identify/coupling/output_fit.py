@@ -36,7 +36,7 @@ from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
-from hmpim.identify.worth import NEARLY, PART, TWICE
+from hmpim.identify.worth import MOST, NEARLY, PART, TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
@@ -327,13 +327,16 @@ def _waiting(inputs: list[Real], pairs: Pairs) -> list[int]:
 def _responds(u: Real, tried: JointFit, fitted: Callable[..., JointFit], *, summed: bool) -> bool:
     """Whether the output responds to an input or, if `summed`, its sum, rather than drifts.
 
-    A pole as slow as the record also explains a drift: it counts only if a drift explains less than
-    the sum does.
+    A response so late that it leaves out most of the record explains errors of the stronger inputs'
+    models, such as friction. A pole as slow as the record also explains a drift: it counts only if
+    a drift explains less than the sum does.
     """
     problem, fit = tried.problem, tried.best.fit
+    if not tried.related or max(fit.delay, problem.begins or 0) >= MOST * problem.y.size:
+        return False
     if not spans_record(fit):
-        return tried.related
-    if not (tried.related and summed):
+        return True
+    if not summed:
         return False
     rows = drift_rows(problem.y.size)
     rows = rows if problem.nuisance is None else np.vstack([rows, problem.nuisance])

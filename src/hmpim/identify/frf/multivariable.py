@@ -14,6 +14,7 @@ from functools import cache, partial
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
@@ -78,9 +79,10 @@ class JointResponse:
 class _Joint:
     """All inputs to one output by one method at one width."""
 
+    own: Regressors
+    found: RationalSolution
     local: LocalFit  # of shape (1, c, m)
-    condition: Real  # (1, c)
-    coherence: Real  # (1, c, m + 1)
+    moved: Complex  # (w, 1, m, k, q): derivatives of the responses by the coefficients
 
 
 def joint_response(
@@ -120,8 +122,9 @@ def joint_response(
     centre = centres_in_band(low, high, _POINTS)
     moved = _moved(inputs, delay * fs, base)
     around = cache(partial(Regressors.around, moved, centre))
-    coherence = _chosen(moved, y[base:], centre, around)[-1]
-    response, variance, condition, _ = _chosen(moved, (y - predicted)[base:], centre, around)
+    parts = scipy.fft.rfft(np.stack((y - predicted, predicted))[:, base:], axis=1)[:, :bins]
+    parts[:, 0] = 0.0
+    response, variance, condition, coherence = _chosen(moved, parts, centre, around)
     frequency = centre * step
     usable = np.maximum(_input_condition(moved, centre), condition) <= _WORST
     response = response * np.exp(-2j * np.pi * frequency[:, None] * delay)
@@ -196,27 +199,38 @@ def _moved(u: Real, late: float, base: int) -> Complex:
 
 
 def _chosen(
-    u: Complex, y: Real, centre: Integer, around: Callable[..., Regressors]
+    u: Complex, parts: Complex, centre: Integer, around: Callable[..., Regressors]
 ) -> tuple[Complex, Real, Real, Real]:
-    """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1)."""
-    spectrum = np.array(scipy.fft.rfft(y))[: u.shape[1]]
-    spectrum[0] = 0.0
-    widths = _widths(centre, u, narrowest=(u.shape[0] + 1) * _TERMS, ratio=_RATIO)
-    polynomials = [fit for width in widths for fit in _fits(around, spectrum, width, None)]
-    _, (g,), _ = choose([fit.local for fit in polynomials], [])
-    inside = np.arange(centre[0], centre[-1] + 1)
-    smooth = spectrum.copy()
-    smooth[inside] = sum(
-        u[j, inside] * np.interp(inside, centre, g[:, j]) for j in range(u.shape[0])
-    )
-    widths = _widths(centre, u, narrowest=20 + 8 * u.shape[0], ratio=2.0)
-    rationals = [fit for width in widths for fit in _fits(around, spectrum, width, smooth)]
-    local = [[fit.local for fit in fits] for fits in (polynomials, rationals)]
-    best, response, variance = choose(*local)
-    tried = (*polynomials, *rationals)
-    condition = picked(np.stack([fit.condition for fit in tried]), best)[0]
-    coherence = picked(np.stack([fit.coherence for fit in tried]), best)[0]
-    return response[0], variance[0], condition, coherence
+    """Chosen responses and variances, (c, m), condition, (c,), and coherence, (c, m + 1).
+
+    The parts, (2, b), are the transforms of a model's residual, whose responses these are, and of
+    its prediction, which the coherence includes. Rational functions are fitted only if the residual
+    is not noise: then the polynomials need narrow windows.
+    """
+    m, residual = u.shape[0], parts[0]
+    widths = _widths(centre, u, narrowest=(m + 1) * _TERMS, ratio=_RATIO)
+    fits = [fit for width in widths for fit in _fits(around, residual, width, None)]
+    best, response, variance = choose([fit.local for fit in fits], [])
+    coherence = _of_chosen(fits, best, partial(_coherence, parts))
+    if (best < 2 * (len(widths) - 2)).mean() > PART:  # there are two fits of each width
+        inside = np.arange(centre[0], centre[-1] + 1)
+        smooth = residual.copy()
+        smooth[inside] = sum(
+            u[j, inside] * np.interp(inside, centre, response[0, :, j]) for j in range(m)
+        )
+        widths = _widths(centre, u, narrowest=20 + 8 * m, ratio=2.0)
+        more = [fit for width in widths for fit in _fits(around, residual, width, smooth)]
+        best, response, variance = choose([f.local for f in fits], [f.local for f in more])
+        fits += more
+    return response[0], variance[0], _of_chosen(fits, best, _condition), coherence
+
+
+def _of_chosen(
+    fits: Sequence[_Joint], best: NDArray[np.int64], read: Callable[[_Joint], Real]
+) -> Real:
+    """What is read of the fit that is chosen at each centre, (1, c); shape (c, ...)."""
+    used, at = np.unique(best[0], return_inverse=True)
+    return picked(np.stack([read(fits[k]) for k in used.tolist()]), at)
 
 
 def _widths(centre: Integer, u: Complex, *, narrowest: int, ratio: float) -> tuple[int, ...]:
@@ -238,50 +252,55 @@ def _fits(
     order = _ORDER if smooth is None else TRANSIENT_ORDER
     own = around(width, transient=order)
     outputs = own.views(y[None])
-    found = []
+    fits = []
     for columns in (own.both, own.plain):
-        if smooth is None:
-            found.append(_joint(own, columns, _polynomial(columns, outputs), outputs))
-            continue
         with np.errstate(all="ignore"):  # an iterate may diverge; it is then not used
-            start = linear_start(columns, own.views(smooth[None]))
-            solution = gauss_newton(columns, outputs, start, steps=_STEPS)
-            found.append(_joint(own, columns, solution, outputs))
-    return found
+            if smooth is None:
+                found = _polynomial(columns, outputs)
+            else:
+                start = linear_start(columns, own.views(smooth[None]))
+                found = gauss_newton(columns, outputs, start, steps=_STEPS)
+            local, moved = read_off(own, columns, found, outputs)
+        fits.append(_Joint(own=own, found=found, local=local, moved=moved))
+    return fits
 
 
-def _joint(own: Regressors, columns: Columns, found: RationalSolution, y: Complex) -> _Joint:
-    """Responses, condition and coherence at each centre from one fit over each window."""
-    m, near = own.power.shape[1], own.windows.near
-    local, moved = read_off(own, columns, found, y)
-    slope = own.at_centres(moved.swapaxes(2, 3))
-    joint = slope @ found.inverse[near].swapaxes(0, 1) @ np.conj(slope.swapaxes(2, 3))
-    failed = np.isinf(local.prediction_error) | ~np.isfinite(joint).all(axis=(2, 3))
-    condition = np.linalg.cond(np.where(failed[..., None, None], np.eye(m), joint))
-    coherence = _coherence(own, found, np.vecdot(y, y).real)[near].swapaxes(0, 1)
-    return _Joint(
-        local=local,
-        condition=np.sqrt(np.maximum(condition, 1.0)),
-        coherence=np.where(failed[..., None], 0.0, coherence),
-    )
+def _condition(fit: _Joint) -> Real:
+    """Condition number of the errors of all inputs' responses at each centre, (c,)."""
+    own, m = fit.own, fit.own.power.shape[1]
+    slope = own.at_centres(fit.moved.swapaxes(2, 3))[0]
+    joint = slope @ fit.found.inverse[own.windows.near, 0] @ np.conj(slope.swapaxes(1, 2))
+    failed = np.isinf(fit.local.prediction_error[0]) | ~np.isfinite(joint).all(axis=(1, 2))
+    condition = np.linalg.cond(np.where(failed[:, None, None], np.eye(m), joint))
+    return np.asarray(np.sqrt(np.maximum(condition, 1.0)))
 
 
-def _coherence(own: Regressors, found: RationalSolution, total: Real) -> Real:
-    """Share of the residual without an input's columns that they explain, (w, r, m + 1)."""
+def _coherence(parts: Complex, fit: _Joint) -> Real:
+    """Share of what the output is without an input's columns that they explain, (c, m + 1).
+
+    The fit is by polynomials, which are linear: that of the output is the residual's and that of
+    the prediction together. The parts are theirs, (2, b).
+    """
     # Adjusted for the number of columns. Without them Σ|residual|² grows by θᴴ V⁻¹ θ of their own.
-    m = own.power.shape[1]
-    squares = np.maximum(found.state.squares, 1e-15 * total)
-    freedom = np.maximum(own.windows.counted - found.inverse.shape[-1], 1)[:, None]
+    own, found, m = fit.own, fit.found, fit.own.power.shape[1]
+    y, count = own.views(parts), found.inverse.shape[-1]
+    linear = own.both.linear[:, :count]
+    predicted = found.inverse[:, 0] @ (np.conj(linear) @ y[:, 1, :, None])
+    theta = found.state.theta[:, 0] + predicted[..., 0]
+    total = y.sum(axis=1)
+    squares = np.maximum(found.state.squares[:, 0], 1e-15 * np.vecdot(total, total).real)
+    freedom = np.maximum(own.windows.counted - count, 1)
     blocks = [slice(j * _TERMS, (j + 1) * _TERMS) for j in range(m)]
-    out = np.zeros((*squares.shape, m + 1))
+    out = np.zeros((squares.size, m + 1))
     for k, block in enumerate((*blocks, slice(0, m * _TERMS))):
-        part = found.state.theta[..., block]
+        part = theta[:, block]
         with np.errstate(all="ignore"):
-            against = np.linalg.pinv(found.inverse[..., block, block], hermitian=True)
+            against = np.linalg.pinv(found.inverse[:, 0, block, block], hermitian=True)
             grown = np.vecdot(part, (against @ part[..., None])[..., 0]).real
         without = (squares + np.maximum(grown, 0.0)) / (freedom + part.shape[-1])
-        out[..., k] = np.clip(1.0 - squares / freedom / without, 0.0, 1.0)
-    return out
+        out[:, k] = np.clip(1.0 - squares / freedom / without, 0.0, 1.0)
+    failed = np.isinf(fit.local.prediction_error[0])
+    return np.where(failed[:, None], 0.0, out[own.windows.near])
 
 
 def _polynomial(columns: Columns, y: Complex) -> RationalSolution:
