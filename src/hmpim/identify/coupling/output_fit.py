@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import FALSE_ALARM
+from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
@@ -262,6 +262,9 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
                 tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
+        own = pairs.fits.get(i)
+        if own is not None and own.related and _leaves_less(own, tried[i]):
+            continue  # it is a coupling
         if _is_large(tried[i]) and _responds(inputs[i], tried[i], fitted, summed=i in summed):
             pairs.put(i, tried[i])
             pairs.strong.append(i)
@@ -310,6 +313,12 @@ def _likely(share: Mapping[int, float]) -> list[int]:
     """Inputs that may be the strongest: a delayed copy of one correlates as well."""
     most = max(share.values(), default=0.0)
     return [j for j, one in share.items() if one >= NEARLY * most]
+
+
+def _leaves_less(one: JointFit, other: JointFit) -> bool:
+    """Whether a fit is clearly likelier than another, as its residual is smaller."""
+    (own, few), (rest, many) = ((f.best.fit.cost, f.problem.counted) for f in (one, other))
+    return bool(0.5 * few * np.log(max(rest / many, 1e-300) / max(own / few, 1e-300)) > CLEARLY)
 
 
 def _is_large(fit: JointFit) -> bool:
