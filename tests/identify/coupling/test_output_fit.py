@@ -1,12 +1,18 @@
 """Several inputs at once: every pair, direct and coupling, from one run."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import RecordError
+from hmpim.identify.coupling.output_fit import _join, _responds
+from hmpim.identify.coupling.pairs import Pairs
 from hmpim.identify.coupling.weak import whitening_of
+from hmpim.identify.fitting.joint import joint_fit
 from hmpim.stimulus.axes import AxisPlan
 
 FS = 200.0
@@ -375,3 +381,34 @@ def test_the_delay_of_a_program_with_two_inputs_is_a_known_number_of_samples():
     for name, late in (("u", 5), ("v", 3)):
         delay = found["y", name].delay
         assert (round(delay.value * 100, 9), delay.std) == (late, 0.0)
+
+
+@pytest.fixture(scope="module")
+def coupled():
+    """A leading input and a coupling of second order, each with its own fit."""
+    rng = np.random.default_rng(0)
+    weak = 0.1 * second_order(INPUTS[2], FS, 0.02, 6.0, 0.3) + 1e-4 * rng.standard_normal(2000)
+    y = second_order(INPUTS[0], FS, 0.02, 8.0, 0.5) + weak
+    lead, coupling = (
+        joint_fit(u, part, intersample="bandlimited", structures=("second_order",))
+        for u, part in ((INPUTS[0], y - weak), (INPUTS[2], weak))
+    )
+    return y, lead, coupling
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_an_input_stays_a_coupling_if_plain_dynamics_explain_less(coupled, known):
+    y, lead, coupling = coupled
+    pairs = Pairs(y=y, valid=None, fits={}, strong=[0], alike=())
+    for i, fit in enumerate((lead, coupling) if known else (lead,)):
+        pairs.put(i, fit)
+    plainly = partial(joint_fit, intersample="bandlimited", structures=("first_order",))
+    _join([INPUTS[0], INPUTS[2]], pairs, plainly)
+    assert pairs.strong == ([0] if known else [0, 1])
+
+
+@pytest.mark.parametrize(("share", "responds"), [(0.4, True), (0.6, False)])
+def test_a_response_that_leaves_out_most_of_the_record_is_no_response(coupled, share, responds):
+    _, _, coupling = coupled
+    late = replace(coupling, problem=replace(coupling.problem, begins=int(share * TIME.size)))
+    assert _responds(INPUTS[2], late, joint_fit, summed=False) is responds
