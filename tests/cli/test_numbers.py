@@ -9,6 +9,7 @@ from hmpim.cli.main import app
 from hmpim.errors import ArgumentError
 from hmpim.identify import Bounds
 from hmpim.optimal import RoughModel
+from tests_support import in_studies
 
 DESIGN = {
     "--duration": "5",
@@ -65,12 +66,26 @@ def test_no_number_ends_a_design_in_a_traceback(option, capsys):
 
 @pytest.mark.parametrize("option", GENTLEST)
 def test_no_number_ends_a_search_in_a_traceback(option, capsys):
-    for value in ("1e308", "1e-308", "nan", "1e29"):
-        words = [f"{name}={value if name == option else usual}" for name, usual in GENTLEST.items()]
-        code = run("gentlest", *words, "--family", "exponential")
+    for value in ("1e308", "1e-308", "nan"):
+        code = run("gentlest", *with_number(option, value), "--family", "exponential")
         assert is_said(code, capsys.readouterr().err), value
-        if value in ("1e308", "nan"):
+        if value != "1e-308":
             assert code == 2, value
+
+
+SEARCHED = ("--noise", "--max-rate")
+"""Options for which a search is made with a number that is merely large."""
+
+
+@pytest.mark.parametrize("option", [*SEARCHED, *in_studies(*sorted({*GENTLEST} - {*SEARCHED}))])
+def test_no_large_number_ends_a_search_in_a_traceback(option, capsys):
+    code = run("gentlest", *with_number(option, "1e29"), "--family", "exponential")
+    assert is_said(code, capsys.readouterr().err)
+
+
+def with_number(option: str, value: str) -> list[str]:
+    """The options of a search, one of them with another value."""
+    return [f"{name}={value if name == option else usual}" for name, usual in GENTLEST.items()]
 
 
 @pytest.mark.parametrize("value", ["1e308", "1e-308"])

@@ -7,6 +7,7 @@ import scipy
 from hmpim.errors import ArgumentError
 from hmpim.model.fine import FINE
 from hmpim.model.friction import Rubbing, rubbed
+from tests_support import in_studies
 
 SECOND = np.array([1.0, 4.0, 16.0])
 SERVO = np.array([1.0, 8.0, 32.0, 64.0])
@@ -20,9 +21,9 @@ UNITS = [
 
 
 def commands(kind: str) -> np.ndarray:
-    t = np.arange(1200 * FINE) / FINE
+    t = np.arange(600 * FINE) / FINE
     if kind == "sweep":
-        return np.sin(2 * np.pi * (0.002 + 2e-5 * t) * t)
+        return np.sin(2 * np.pi * (0.002 + 4e-5 * t) * t)
     noise = np.random.default_rng(4).standard_normal(t.size)
     smooth = scipy.signal.lfilter(*scipy.signal.butter(3, 0.06, fs=FINE), noise)
     smooth[: 3 * FINE] = 0.0
@@ -61,7 +62,7 @@ def linear(command: np.ndarray, unit: Rubbing) -> np.ndarray:
     return scipy.signal.lfilter(system[0][0], system[1], command)
 
 
-@pytest.mark.parametrize("kind", ["sweep", "noise"])
+@pytest.mark.parametrize("kind", ["sweep", *in_studies("noise")])
 @pytest.mark.parametrize("unit", UNITS)
 def test_sliding_and_sticking_as_by_small_steps_of_time(unit, kind):
     command = commands(kind)

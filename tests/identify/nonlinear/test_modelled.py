@@ -240,7 +240,7 @@ def servo(lag: float, friction: float = 0.03) -> np.ndarray:
     return unit.simulate(sweep(t), t, intersample="foh")[::fine]
 
 
-@pytest.mark.parametrize("rounding", [0.0, 0.01])
+@pytest.mark.parametrize("rounding", [0.01, *in_studies(0.0)])
 @pytest.mark.parametrize("place", sorted(LAGS))
 def test_friction_in_a_servo_whose_force_lags(place, rounding):
     """Also behind a coarse encoder, whose rounding error is most of the residual, and not white."""
