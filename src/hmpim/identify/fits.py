@@ -8,6 +8,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.coupling.output_fit import (
+    FitDrift,
     Led,
     OutputFit,
     fit_leading,
@@ -227,10 +228,12 @@ def _leaves_tail(joint: JointFit) -> bool:
     return hidden_tail(joint.weighed, joint.best.fit, share=joint.weighed_share) is not None
 
 
-def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> OutputFit | None:
+def _plain_beside_drift(
+    question: Question, seen: Imperfections, led: Led, finish: Callable[[], OutputFit]
+) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `led` are plain fits of the strong inputs, with a constant bias.
+    `led` are plain fits of the strong inputs, with a constant bias; `finish` finishes these.
     """
     known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))
@@ -250,7 +253,7 @@ def _plain_beside_drift(question: Question, seen: Imperfections, led: Led) -> Ou
     found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
     if found is None or not found[0].related or _leaves_tail(found[0]):
         return None
-    steady = fit_once(question, seen, question.plain, begun=led)
+    steady = finish()
     former = steady.fits[asked]
     if former.best.fit.is_white and steady.slow is None:
         return None
@@ -346,7 +349,7 @@ def fit_once(
     rows: Real | None = None,
     *,
     begun: Course | Led | None = None,
-    fit_drift: Callable[[Led], OutputFit | None] | None = None,
+    fit_drift: FitDrift | None = None,
     strong_only: bool = False,
 ) -> OutputFit:
     """Fit an output to all inputs, with `rows` in addition to the bias, on informative samples.

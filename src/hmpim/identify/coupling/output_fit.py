@@ -41,7 +41,7 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
 
-__all__ = ["Led", "OutputFit", "fit_leading", "fit_together", "without_slow"]
+__all__ = ["FitDrift", "Led", "OutputFit", "fit_leading", "fit_together", "without_slow"]
 
 Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
@@ -112,6 +112,10 @@ class OutputFit:
         return np.sum(trends, axis=0) if trends else None
 
 
+FitDrift = Callable[[Led, Callable[[], OutputFit]], OutputFit | None]
+"""Fit plain dynamics with a drift, from the strong inputs' fits and what finishes these without."""
+
+
 def without_slow(led: Led) -> Led:
     """The fits that are not as slow as a drift."""
     return {j: fit for j, fit in led.items() if not _is_slow(fit)}
@@ -133,7 +137,7 @@ def fit_together(
     alike: Sequence[tuple[frozenset[int], Mask]] = (),
     nuisance: Real | None = None,
     led: Led | None = None,
-    fit_drift: Callable[[Led], OutputFit | None] | None = None,
+    fit_drift: FitDrift | None = None,
     strong_only: bool = False,
 ) -> OutputFit:
     """Fit one output, (n,), to several inputs.
@@ -146,9 +150,9 @@ def fit_together(
     The search starts from the fits `led` if given; they may have been made with other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
-    then fits plain dynamics with one, given the plain fits to the strong inputs, and its value is
-    returned unless it is None. If `strong_only`, only strong inputs are fitted, with plain
-    dynamics, and the others count as unrelated.
+    then fits plain dynamics with one, given the plain fits to the strong inputs and a function that
+    finishes plain dynamics without; its value is returned unless it is None. If `strong_only`, only
+    strong inputs are fitted, with plain dynamics, and the others count as unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -173,22 +177,22 @@ def fit_together(
             strong=tuple(j in pairs.strong for j in range(len(inputs))),
         )
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
-        drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong})
+        steady = partial(_finished, inputs, pairs.copy(), fitted, plainly, plain)
+        drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong}, steady)
         if drifting is not None:
             return drifting
-    richly = partial(fitted, structures=structures, shared=True)
-    _fit_in_turns(inputs, pairs, plainly, richly, structures)
-    return _moved_at_once(pairs)
+    return _finished(inputs, pairs, fitted, plainly, structures)
 
 
-def _fit_in_turns(
+def _finished(
     inputs: list[Real],
     pairs: Pairs,
+    fitted: Callable[..., JointFit],
     plainly: Callable[..., JointFit],
-    richly: Callable[..., JointFit],
     structures: tuple[StructureName, ...],
-) -> None:
-    """Fit the strong inputs and the couplings, in place, until moving all at once gains little."""
+) -> OutputFit:
+    """Fit the strong inputs and the couplings until moving all at once gains little."""
+    richly = partial(fitted, structures=structures, shared=True)
     least = pairs.cost
     _fit_couplings(inputs, pairs, structures)
     for _ in range(_TURNS):
@@ -203,6 +207,7 @@ def _fit_in_turns(
             break  # otherwise each was fitted with wrong contributions of the others
         _fit_couplings(inputs, pairs, structures)
         pairs.refine(pairs.kept, None)
+    return _moved_at_once(pairs)
 
 
 def _moved_at_once(pairs: Pairs) -> OutputFit:

@@ -220,13 +220,13 @@ def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName,
     Half a sample of delay, or a zero, may have replaced a missing pole: so poles are also added to
     other trials, and the likeliest result leads.
     """
-    grown, rivals, hidden = _grown_from(joint, joint.best, course, structures)
-    leading, found = (joint.best, *grown)[-1], [*joint.trials, *grown]
-    for trial in _others_to_grow(joint, course.natural):
+    leading, rivals, hidden, found = joint.best, joint.rivals, joint.hidden, list(joint.trials)
+    for trial in (joint.best, *_others_to_grow(joint, course.natural)):
         grown, further, test = _grown_from(joint, trial, course, structures)
         found += grown
-        if grown and grown[-1].criterion < leading.criterion:
-            leading, rivals, hidden = grown[-1], further, test
+        likeliest = (trial, *grown)[-1]
+        if trial is joint.best or (grown and likeliest.criterion < leading.criterion):
+            leading, rivals, hidden = likeliest, further, test
     joint = replace(joint, trials=tuple(found), rivals=rivals, hidden=hidden)
     return joint if leading is joint.best else _with_leading(leading, joint, course)
 
