@@ -177,8 +177,16 @@ def fit_together(
             strong=tuple(j in pairs.strong for j in range(len(inputs))),
         )
     if fit_drift is not None and whitening_of(pairs.residual()) is not None:
-        steady = partial(_finished, inputs, pairs.copy(), fitted, plainly, plain)
-        drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong}, steady)
+        found = {j: pairs.fits[j] for j in pairs.strong}
+
+        def steady() -> OutputFit:
+            again = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
+            again.resume(found, nuisance)
+            if len(found) > 1:  # which samples count is decided anew
+                _join(inputs, again, plainly)
+            return _finished(inputs, again, fitted, plainly, plain)
+
+        drifting = fit_drift(found, steady)
         if drifting is not None:
             return drifting
     return _finished(inputs, pairs, fitted, plainly, structures)

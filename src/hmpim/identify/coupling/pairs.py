@@ -34,16 +34,6 @@ class Pairs:
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
-    def copy(self) -> "Pairs":
-        """The same fits, to go on from in another way."""
-        return replace(
-            self,
-            fits={**self.fits},
-            strong=[*self.strong],
-            masks={**self.masks},
-            _searched={**self._searched},
-        )
-
     @property
     def kept(self) -> list[int]:
         """The inputs that the output is known to follow."""

@@ -17,6 +17,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.effects.disturbance import criterion_gain, without_rows
 from hmpim.identify.fitting.candidates import spans_record
 from hmpim.identify.fitting.derivatives import jacobian
+from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.least_squares import solved, without
 from hmpim.identify.fitting.sampled_rows import part_of
@@ -69,8 +70,11 @@ def with_drift(first: JointFit, fitted: _Fitted) -> tuple[JointFit, Drifting | N
     every = drift_rows(first.problem.y.size)
     joint = fitted(every, True)
     plainly = is_white(joint.best.fit.residual)
-    if not plainly:  # a drift can imitate missing dynamics
-        joint = fitted(every, False)
+    if not plainly:
+        known = first.best.fit
+        if is_white(known.residual) and known.structure.name in PLAIN:
+            return first, None  # plain dynamics suffice without a drift
+        joint = fitted(every, False)  # a drift can imitate missing dynamics
     columns = _shape(joint.problem, joint.best.fit, every)
 
     gain = criterion_gain(joint, len(columns), first.best.fit, first.problem)
