@@ -14,6 +14,7 @@ from hmpim.identify.coupling.pairs import Pairs
 from hmpim.identify.coupling.weak import whitening_of
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.stimulus.axes import AxisPlan
+from tests_support import in_studies
 
 FS = 200.0
 TIME = np.arange(2000) / FS
@@ -298,7 +299,7 @@ def test_a_high_pass_alone_may_be_stated_for_inputs_that_do_not_follow():
     assert found["y", "u1"].parameters.scale_factor is None
 
 
-@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("seed", [3, *in_studies(8)])
 def test_couplings_to_inputs_that_are_alike_at_low_frequencies_are_both_found(seed):
     limits = hmpim.Limits(position=5.0, velocity=200.0, acceleration=8000.0, unit="deg")
     tops = {"roll": 80.0, "yaw": 60.0, "pitch": 50.0, "azimuth": 30.0, "elevation": 30.0}

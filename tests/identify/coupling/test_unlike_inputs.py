@@ -5,6 +5,7 @@ import pytest
 
 import hmpim
 from hmpim.identify.coupling import output_fit
+from tests_support import in_studies
 
 FS, SAMPLES = 100.0, 2000
 NOISE = 0.01
@@ -75,7 +76,7 @@ HUM = 0.05 * np.sin(2 * np.pi * 23.3 * TIME + 1.0)
 
 @pytest.mark.parametrize(
     ("disturbance", "codes"),
-    [(WARMING, {"drift"}), (HUM, {"hum"}), (WARMING + HUM, {"drift", "hum"})],
+    [(WARMING + HUM, {"drift", "hum"}), *in_studies((WARMING, {"drift"}), (HUM, {"hum"}))],
 )
 def test_a_drift_and_a_hum_are_fitted_beside_several_inputs(disturbance, codes):
     models = (model(6.0, 0.5, 0.021, 1.0), model(4.0, 0.8, 0.033, 0.3))

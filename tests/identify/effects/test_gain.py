@@ -11,7 +11,7 @@ from hmpim.identify.effects.gain import scored
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.model import STRUCTURES
 from hmpim.model.sampled import prepare_input
-from tests_support import assert_share, holds
+from tests_support import assert_share, holds, in_studies
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -90,7 +90,7 @@ def test_the_score_finds_the_change_with_its_error(fitted):
     assert abs(one.change - 0.04) < 4 * one.std < 0.04
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(6)
 def test_a_change_is_found_and_the_figures_are_those_of_the_mean_gain(seeds):
     pairs = [found(seed) for seed in range(seeds)]
     assert all(len(of_gain(pair)) == 1 for pair in pairs)
@@ -113,7 +113,7 @@ def test_the_finding_says_how_much_and_the_prediction_includes_it():
     assert np.std(y - pair.prediction) == pytest.approx(0.01, rel=0.1)
 
 
-@pytest.mark.parametrize("rate", [2.0, 5.0, 12.0])
+@pytest.mark.parametrize("rate", [5.0, *in_studies(2.0, 12.0)])
 def test_a_gain_that_settles_is_found_as_well(rate):
     pair = hmpim.identify(record_of(warming(rate), 3))["y", "u"]
     assert len(of_gain(pair)) == 1
@@ -139,7 +139,7 @@ def test_a_constant_gain_is_not_said_to_change(seeds):
     assert not [of_gain(pair) for pair in pairs if of_gain(pair)]
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("zeros", "poles"), [([0.03, 1.0], [0.002, 0.06, 1.0]), ([0.08, 1.0], [0.03, 1.0])]
 )
