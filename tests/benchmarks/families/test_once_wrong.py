@@ -99,6 +99,14 @@ def test_a_long_record_shows_all_poles(index):
         set_samples(None)
 
 
+@pytest.mark.study
+def test_white_noise_is_kept_where_another_turn_of_two_inputs_leaves_more():
+    try:
+        assert one("by chance, two inputs", 78, 0, True, samples=10_000).cell == "right_ok"
+    finally:
+        set_samples(None)
+
+
 def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():
     assert one("by chance", 404, 9, True).cell == "right_ok"
 

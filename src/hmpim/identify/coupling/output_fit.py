@@ -204,9 +204,14 @@ def _finished(
     least = pairs.cost
     _fit_couplings(inputs, pairs, structures)
     for _ in range(_TURNS):
-        before = pairs.structures
+        before, reached, rest = pairs.structures, pairs.cost, pairs.residual()
+        fits, masks = {**pairs.fits}, {**pairs.masks}
         _fit_strong(inputs, pairs, richly)
         pairs.refine(pairs.kept, None)
+        if pairs.cost > TWICE * reached and whitening_of(rest) is None:  # it ended elsewhere
+            pairs.fits.update(fits)
+            pairs.masks.update(masks)
+            break
         clearer = pairs.cost * TWICE < least
         if clearer:
             _join(inputs, pairs, plainly)
