@@ -84,6 +84,13 @@ def test_a_draw_that_was_doubted_and_wrong_is_right(family, seed, index):
     assert one(family, seed, index, True).cell == "right_ok"
 
 
+@pytest.fixture
+def usual_length_afterwards():
+    """Records drawn after the test are as long as usual."""
+    yield
+    set_samples(None)
+
+
 @pytest.mark.parametrize(
     "index",
     [
@@ -92,19 +99,15 @@ def test_a_draw_that_was_doubted_and_wrong_is_right(family, seed, index):
         6,  # backlash did for a third and a fourth
     ],
 )
-def test_a_long_record_shows_all_poles(index):
-    try:
-        assert one("Bessel", 1183, index, True, samples=10_000).cell == "right_ok"
-    finally:
-        set_samples(None)
+def test_a_long_record_shows_all_poles(index, usual_length_afterwards):
+    assert one("Bessel", 1183, index, True, samples=10_000).cell == "right_ok"
 
 
 @pytest.mark.study
-def test_white_noise_is_kept_where_another_turn_of_two_inputs_leaves_more():
-    try:
-        assert one("by chance, two inputs", 78, 0, True, samples=10_000).cell == "right_ok"
-    finally:
-        set_samples(None)
+def test_white_noise_is_kept_where_another_turn_of_two_inputs_leaves_more(
+    usual_length_afterwards,
+):
+    assert one("by chance, two inputs", 78, 0, True, samples=10_000).cell == "right_ok"
 
 
 def test_two_modes_are_grown_where_a_clipped_record_begins_in_motion():

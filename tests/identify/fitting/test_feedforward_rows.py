@@ -101,7 +101,7 @@ def test_error_bars_are_the_scatter(stated):
 
 
 def test_error_bars_are_the_scatter_of_a_few():
-    _check_coverage(range(6), "feedforward")
+    _check_coverage(range(12), "feedforward")
 
 
 def _check_coverage(seeds, stated):

@@ -10,7 +10,7 @@ from hmpim.identify.arrays import Complex, Mask, Real, averaged
 from hmpim.identify.frf.neighbours import LocalFit
 from hmpim.identify.worth import PART, TOLERATED, TWICE
 
-__all__ = ["choose", "picked"]
+__all__ = ["choose", "needs_narrow_windows", "picked"]
 
 # Criteria are averaged over this many frequencies on either side.
 _NEIGHBOURS = 30
@@ -80,6 +80,19 @@ def choose(
     chosen = np.asarray(np.where(cheap, below, best), dtype=np.int64)
     error = picked(spread * np.stack([fit.noise for fit in tried])[..., None] + bias, chosen)
     return chosen, picked(response, chosen).reshape(shape), error.reshape(shape)
+
+
+def needs_narrow_windows(chosen: NDArray[np.int64], widths: int) -> Mask:
+    """Whether polynomials over the two widest windows do not suffice, as for noise, (...,).
+
+    `chosen`, (..., c), are indices of two fits of each of so many widths, with T and without.
+
+    Examples
+    --------
+    >>> needs_narrow_windows(np.array([[0, 1, 4, 5], [6, 7, 8, 9]]), 5).tolist()
+    [True, False]
+    """
+    return np.asarray((chosen < 2 * (widths - 2)).mean(axis=-1) > PART)
 
 
 def picked(values: NDArray[Any], chosen: NDArray[np.int64]) -> NDArray[Any]:

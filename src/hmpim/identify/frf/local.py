@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hmpim.errors import ArgumentError
 from hmpim.identify.arrays import Complex, Mask, Real
 from hmpim.identify.chance import searched
-from hmpim.identify.frf.choice import choose
+from hmpim.identify.frf.choice import choose, needs_narrow_windows
 from hmpim.identify.frf.neighbours import WIDEST, LocalFit, Spectra, centres_in_band, transform
 from hmpim.identify.frf.polynomial import polynomial_fits
 from hmpim.identify.frf.rational import Regressors, rational_fits
@@ -169,8 +169,8 @@ def _chosen(
     chosen, response, variance = choose(polynomials, ())
     rational = _rational_widths(centre, spectra.u.size)
     rough = np.ones(spectra.y.shape[0], dtype=bool)
-    if residual:  # there are two fits of each width
-        rough = (chosen < 2 * (len(widths) - 2)).mean(axis=-1) > PART
+    if residual:
+        rough = needs_narrow_windows(chosen, len(widths))
     if not rational or not rough.any():
         return response, variance
     polynomials = [fit.of(rough) for fit in polynomials]

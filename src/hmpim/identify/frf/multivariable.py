@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.identify.arrays import Complex, Mask, Real
-from hmpim.identify.frf.choice import choose, picked
+from hmpim.identify.frf.choice import choose, needs_narrow_windows, picked
 from hmpim.identify.frf.columns import Columns
 from hmpim.identify.frf.neighbours import (
     Integer,
@@ -212,7 +212,7 @@ def _chosen(
     fits = [fit for width in widths for fit in _fits(around, residual, width, None)]
     best, response, variance = choose([fit.local for fit in fits], [])
     coherence = _of_chosen(fits, best, partial(_coherence, parts))
-    if (best < 2 * (len(widths) - 2)).mean() > PART:  # there are two fits of each width
+    if needs_narrow_windows(best, len(widths)).any():
         inside = np.arange(centre[0], centre[-1] + 1)
         smooth = residual.copy()
         smooth[inside] = sum(
