@@ -23,10 +23,10 @@ from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
-from hmpim.identify.fitting.second_zero import with_second_zero
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
 from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
+from hmpim.identify.fitting.zeros import with_second_zero
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
 from hmpim.model.dynamics import StructureName

@@ -98,6 +98,11 @@ class HiddenPole:
         return float(np.sqrt(max(self.squared, 0.0) + HALF * self.std))
 
     @property
+    def lead(self) -> float:
+        """Longest time constant of a zero, in samples, that the record does not exclude."""
+        return float(np.sqrt(max(-self.squared, 0.0) + HALF * self.std))
+
+    @property
     def is_significant(self) -> bool:
         """Whether a further pole is significant, and slow enough to matter."""
         return self.squared > ONE_SIDED * self.std and self.squared > (MATERIAL * self.scale) ** 2
@@ -115,6 +120,11 @@ class HiddenPole:
         servo = structure.order == 2 and structure.zeros > structure.dc_zeros == 0
         chain = structure.order <= 1 or servo or (structure.order > 2 and proper)
         return chain and far
+
+    @property
+    def may_hide_zero(self) -> bool:
+        """Whether the fit may hide one more zero that is slow."""
+        return self.lead > PART * self.scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -271,9 +281,8 @@ def as_if_zero(fit: Fit, hidden: HiddenPole) -> Fit:
     fit, hidden
         As for `as_if_hidden`.
     """
-    lead = float(np.sqrt(max(-hidden.squared, 0.0) + HALF * hidden.std))
-    theta, linear = _moved(fit, -(lead**2) * hidden.shift, later=lead)
-    linear = np.append(np.convolve(linear[:-1], [1.0, lead]), linear[-1])
+    theta, linear = _moved(fit, -(hidden.lead**2) * hidden.shift, later=hidden.lead)
+    linear = np.append(np.convolve(linear[:-1], [1.0, hidden.lead]), linear[-1])
     structure = replace(fit.structure, zeros=fit.structure.zeros + 1)
     return replace(fit, structure=structure, theta=theta, linear=linear)
 

@@ -9,12 +9,13 @@ The input is then assumed band-limited, or held if it mostly stands still and ju
 record clearly contradicts it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import CLEARLY, ONE_SIDED
 from hmpim.identify.fitting.beginning import in_motion, look_again
 from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import is_poor
@@ -40,6 +41,7 @@ from hmpim.identify.fitting.software import software_fit
 from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
 from hmpim.identify.fitting.whitening import weighed_by_noise
+from hmpim.identify.fitting.zeros import SECOND_ZERO, mirrored, second_zeros
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure, StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -158,7 +160,7 @@ def chosen_of(
     course, fitted = enrich(course, fitted)
     course, trials, best, share = weigh_and_look_again(course, fitted)
     joint = settle(course, trials, best, share)
-    return grow_poles(joint, course, structures) if growing else joint
+    return try_neighbours(joint, course, structures) if growing else joint
 
 
 def settle(
@@ -214,21 +216,59 @@ def _looked_again(course: Course, fitted: Fits) -> tuple[Course, list[Trial], Tr
     return course, trials, best, share
 
 
-def grow_poles(joint: JointFit, course: Course, structures: tuple[StructureName, ...]) -> JointFit:
-    """Add poles that the likelihood supports, and record what it leaves open.
+def try_neighbours(
+    joint: JointFit, course: Course, structures: tuple[StructureName, ...]
+) -> JointFit:
+    """Add poles and zeros that the likelihood supports, and record what it leaves open.
 
     Half a sample of delay, or a zero, may have replaced a missing pole: so poles are also added to
-    other trials, and the likeliest result leads.
+    other trials. Delay may also have put a zero into the wrong half plane, or replaced a servo's
+    second one. The likeliest result leads.
     """
-    leading, rivals, hidden, found = joint.best, joint.rivals, joint.hidden, list(joint.trials)
-    for trial in (joint.best, *_others_to_grow(joint, course.natural)):
+    leading, hidden, rivals = joint.best, joint.hidden, list[Trial]()
+    mirrored = _mirrored(joint, course)
+    found = [*joint.trials, *mirrored]
+    for trial in (joint.best, *mirrored, *_others_to_grow(joint, course.natural)):
         grown, further, test = _grown_from(joint, trial, course, structures)
         found += grown
+        rivals += further
         likeliest = (trial, *grown)[-1]
-        if trial is joint.best or (grown and likeliest.criterion < leading.criterion):
-            leading, rivals, hidden = likeliest, further, test
-    joint = replace(joint, trials=tuple(found), rivals=rivals, hidden=hidden)
+        is_new = bool(grown) or trial in mirrored
+        if trial is joint.best or (is_new and likeliest.criterion < leading.criterion):
+            leading, hidden = likeliest, test
+    if hidden is not None and SECOND_ZERO in structures:
+        mode = leading.intersample
+        problem = course.data.problem(mode, course.counted)
+        seconds = _trials_of(joint, mode, second_zeros(problem, leading.fit, hidden))
+        found += seconds
+        likeliest = min([leading, *seconds], key=lambda trial: trial.criterion)
+        if likeliest is not leading:
+            leading, hidden = likeliest, course.data.hidden_pole(problem, likeliest.fit)
+    asked = [rival for rival in rivals if _is_better(rival, leading, joint)]
+    joint = replace(joint, trials=tuple(found), rivals=tuple(asked), hidden=hidden)
     return joint if leading is joint.best else _with_leading(leading, joint, course)
+
+
+def _trials_of(joint: JointFit, mode: Intersample, fits: Iterable[Fit]) -> list[Trial]:
+    """Fits to all that a joint fit counts, with Schwarz's criterion."""
+    count = joint.weighed.counted * joint.weighed_share
+    return [trial_of(mode, fit, count) for fit in fits]
+
+
+def _is_better(rival: Trial, leading: Trial, joint: JointFit) -> bool:
+    """Whether a richer fit is better than the leading one by more than chance."""
+    count = joint.weighed.counted * joint.weighed_share
+    richer = rival.fit.structure.parameters > leading.fit.structure.parameters
+    gain = count * float(np.log(leading.fit.objective / rival.fit.objective))
+    return richer and gain >= ONE_SIDED**2
+
+
+def _mirrored(joint: JointFit, course: Course) -> list[Trial]:
+    """The best trial with a zero in the other half plane, if that is about as likely."""
+    best, count = joint.best, joint.weighed.counted * joint.weighed_share
+    problem = course.data.problem(best.intersample, course.counted)
+    hopeless = best.fit.objective * float(np.exp(2 * CLEARLY / count))
+    return _trials_of(joint, best.intersample, mirrored(problem, best.fit, hopeless=hopeless))
 
 
 def _others_to_grow(joint: JointFit, natural: Intersample) -> list[Trial]:
@@ -272,9 +312,7 @@ def _grown_from(
         names=structures,
         otherwise=otherwise,
     )
-    grown, rivals = (
-        tuple(trial_of(mode, fit, count) for fit in fits) for fits in (growth.grown, growth.rivals)
-    )
+    grown, rivals = (tuple(_trials_of(joint, mode, f)) for f in (growth.grown, growth.rivals))
     return grown, rivals, growth.hidden
 
 

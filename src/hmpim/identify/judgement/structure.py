@@ -9,7 +9,7 @@ from hmpim.identify.fitting.tail import hidden_tail
 from hmpim.identify.judgement.evidence import Evidence, structure_in_words
 from hmpim.identify.reading.spanned import asked_rivals, plainer_rivals
 from hmpim.identify.result.groups import AT_DC, PHASE_SPLIT
-from hmpim.identify.worth import MATERIAL, MOST, TOLERATED
+from hmpim.identify.worth import FEW, MATERIAL, MOST, TOLERATED
 from hmpim.record import Finding
 
 __all__ = ["ALMOST", "barely_distinguished", "missed_pole", "missed_tail", "other_order"]
@@ -45,17 +45,18 @@ def other_order(evidence: Evidence) -> Iterator[Finding]:
 
 def _plainer(evidence: Evidence) -> Iterator[Finding]:
     """Name the structure that is almost as likely, plainer or richer: the intervals cover it."""
-    joint, name = evidence.joint, evidence.joint.best.fit.structure.name
-    rivals = (*plainer_rivals(joint), *asked_rivals(joint))
-    if not rivals:
-        return
-    rival = min(rivals, key=lambda trial: trial.criterion).fit
-    yield _undecided(
-        f"This record barely distinguishes the {structure_in_words(name)} model from the "
-        f"{structure_in_words(rival.structure.name)} one, with which the delay would be "
-        f"{rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower the noise, or sweep "
-        "higher, to tell."
-    )
+    joint, best = evidence.joint, evidence.joint.best.fit
+    trials = sorted((*plainer_rivals(joint), *asked_rivals(joint)), key=lambda t: t.criterion)
+    others = [trial.fit for trial in trials if trial.fit.structure != best.structure]
+    twins = [trial.fit for trial in trials if abs(trial.fit.delay - best.delay) > FEW]
+    for rival in (*others, *twins)[:1]:
+        own, other = (structure_in_words(fit.structure.name) for fit in (best, rival))
+        there = f"{other} one" if others else "same one with a zero in the other half plane"
+        yield _undecided(
+            f"This record barely distinguishes the {own} model from the {there}, with which the "
+            f"delay would be {rival.delay / evidence.fs:.4g} s. The intervals cover this. Lower "
+            "the noise, or sweep higher, to tell."
+        )
 
 
 def barely_distinguished(chosen: str, *, poles: int, delay: float) -> Finding:

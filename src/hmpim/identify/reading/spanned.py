@@ -20,6 +20,7 @@ from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import adjusted_for_pole, as_if_hidden, as_if_zero
 from hmpim.identify.fitting.held_steps import at_ends, in_whole_samples
 from hmpim.identify.fitting.trial import JointFit, Trial
+from hmpim.identify.fitting.zeros import SECOND_ZERO, is_servo
 from hmpim.identify.reading.figures import figures_at, figures_of
 from hmpim.identify.result import Estimate, Parameters
 from hmpim.identify.result.groups import BANDWIDTHS, MODELLED, PHASE_SPLIT
@@ -78,7 +79,7 @@ def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
         trial
         for trial in joint.trials
         if trial.intersample == best.intersample
-        and trial.fit.structure != best.fit.structure
+        and trial is not best
         and trial.fit.structure.parameters <= most
         and trial.criterion - best.criterion < 2 * LIKELIER
         and trial.fit.objective < TWICE * best.fit.objective  # else they are of other data
@@ -86,25 +87,28 @@ def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
 
 
 def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
-    """Plain trials under the chosen assumption, with more parameters, better by more than chance.
+    """Trials under the chosen assumption, with more parameters, better by more than chance.
 
-    They were not chosen because of their price alone.
+    They were not chosen because of their price alone: plain ones next to a plain one, and two zeros
+    next to one. Two zeros also count if the second one would not show.
     """
     best = joint.best
-    if best.fit.structure.name not in PLAIN:
-        return ()
+    structure = best.fit.structure
     count = joint.weighed.counted * joint.weighed_share
+    hides_zero = joint.hidden is not None and joint.hidden.may_hide_zero
 
-    def is_better(trial: Trial) -> bool:
-        extra = trial.fit.structure.parameters - best.fit.structure.parameters
-        own = trial.intersample == best.intersample and trial.fit.structure.name in PLAIN
-        if extra <= 0 or not own:
+    def is_asked(trial: Trial) -> bool:
+        other = trial.fit.structure
+        extra = other.parameters - structure.parameters
+        alike = structure.name in PLAIN and other.name in PLAIN
+        second = is_servo(structure) and other.name == SECOND_ZERO
+        if extra <= 0 or trial.intersample != best.intersample or not (alike or second):
             return False
         here, there = (max(each.fit.objective, _TINY) for each in (best, trial))
         gain = count * (np.log(here) - np.log(there))
-        return bool(gain > scipy.special.chdtri(extra, 1.0 - COVERAGE))
+        return bool(gain > scipy.special.chdtri(extra, 1.0 - COVERAGE) or (second and hides_zero))
 
-    return tuple(filter(is_better, joint.trials))
+    return tuple(filter(is_asked, joint.trials))
 
 
 def spanned(
