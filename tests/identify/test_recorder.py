@@ -77,6 +77,19 @@ def test_an_input_recorded_by_a_slower_clock_is_interpolated():
     assert pair.delay.value == pytest.approx(0.02, abs=1e-3)
 
 
+@pytest.mark.parametrize("is_held", [False, True])
+def test_an_input_that_may_be_held_or_recorded_slowly_has_intervals_for_both(is_held):
+    smooth = np.sin(2 * np.pi * (0.1 * T + 0.1 * T**2))
+    u = smooth[np.arange(U.size) // 4 * 4]
+    noise = 0.1 * np.random.default_rng(0).standard_normal(U.size)
+    pair = identified(u, noise + (answered(u, "zoh") if is_held else answered(smooth)))
+    (finding,) = (w for w in pair.warnings if w.code == "input_slow")
+    assert finding.severity == "doubt"
+    low, high = pair.delay_low_frequency.ci95
+    assert low < 0.02 + 2.0 * 0.5 / (2 * np.pi * 8.0) < high
+    assert high - low == pytest.approx(0.5 / 50.0 + 2 * 1e-3, abs=1e-3)  # and the noise
+
+
 def test_a_converter_slower_than_the_record_stays_held():
     u = U[np.arange(U.size) // 4 * 4]
     pair = identified(u, answered(u, "zoh"))

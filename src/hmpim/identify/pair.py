@@ -297,6 +297,9 @@ def _evidence(
     bending = joined.bending_of(own.i)
     if bending is not None:
         others.extend(bending.others.values())
+    later = np.arange(fit.theta.size) == 0
+    if own.i in question.later:
+        others.append(replace(fit, theta=fit.theta + question.later[own.i] * later))
     whole = spanned(
         readings.parameters,
         joint,

@@ -55,7 +55,7 @@ class _Suspect:
     question: Question
     finding: Finding
     long: bool = False  # whether the stretches are too long to be filled in
-    if_undecided: Finding | None = None  # what is reported if neither question is clearly likelier
+    if_undecided: Question | None = None  # what is asked if neither is clearly likelier
 
 
 def leave_out_lost(question: Question) -> Question:
@@ -153,7 +153,7 @@ def _examined(question: Question, suspect: _Suspect | None) -> Question:
     if gain > (searched(question.output.values.size) if searches else CLEARLY):
         return _with(suspect.question, suspect.finding)
     if suspect.if_undecided is not None and gain > -CLEARLY:
-        return _with(question, suspect.if_undecided)
+        return suspect.if_undecided
     return question
 
 
@@ -319,12 +319,13 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
         code="input_slow",
         message=f"The input {source.name!r} changes at only {slow:.4g} Hz and is treated as held. "
         "If it moved smoothly and only its record is so slow, the delay is "
-        f"{0.5 / slow:.3g} s longer. This record cannot distinguish the two: record the input "
-        "faster, or state intersample='zoh' (--intersample zoh) if the unit receives the held "
-        "values.",
+        f"{0.5 / slow:.3g} s longer. This record cannot distinguish the two, and the intervals "
+        "cover both: record the input faster, or state intersample='zoh' (--intersample zoh) if "
+        "the unit receives the held values.",
         severity="doubt",
         parameters=TIMING,
     )
+    later = {**question.later, i: 0.5 * fs / slow}
     known = np.zeros(source.valid.size, dtype=bool)
     known[at] = True
     values = _filled(question, source, known).values.copy()
@@ -338,7 +339,8 @@ def _slow_log(question: Question, i: int) -> _Suspect | None:
         valid[here] &= share_above(source.values[end], fs=slow, limit=PART * slow) < _FOLDED
     output = replace(question.output, valid=valid)
     smooth = replace(read, output=output, intersample="bandlimited")
-    return _Suspect(question=smooth, finding=finding, if_undecided=undecided)
+    asked = _with(replace(question, later=later), undecided)
+    return _Suspect(question=smooth, finding=finding, if_undecided=asked)
 
 
 def _samples(found: Mask) -> str:

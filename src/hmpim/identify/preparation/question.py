@@ -3,7 +3,8 @@
 Also whether the record is that of software, which processes samples and nothing between them.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -39,6 +40,8 @@ class Question:
     exact: bool = False  # whether a filter between samples explains all but rounding
     limited: LimitedCommand | None = None  # a speed limit; the input is then the limited command
     linear: bool = False  # whether a nonlinearity is only reported, not modelled
+    # samples of delay in addition, by input, if one that a slow clock may record moved smoothly
+    later: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def plain(self) -> tuple[StructureName, ...]:
