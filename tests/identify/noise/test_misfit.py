@@ -58,3 +58,29 @@ def test_the_share_is_of_the_whole_power_and_within_of_that_in_the_band():
     assert found.probability < 1e-9
     assert found.share == pytest.approx(0.25 / 1.25, abs=0.03)
     assert 2.0 * found.share < found.within < 1.0
+
+
+def two_inputs(rng, other):
+    """Two sweeps, and an output that follows the first late and, by `other`, the second."""
+    u = np.sin(2 * np.pi * (0.001 * T + 5e-5 * T**2))
+    v = np.sin(2 * np.pi * (0.2 * T - 4.9e-5 * T**2 + 0.1))
+    missed = lfilter([0.5], [1.0, -0.5], np.concatenate([np.zeros(40), u])[:N])
+    return u, v, missed + other * v + 0.01 * rng.standard_normal(N)
+
+
+def test_what_another_input_left_is_no_noise_if_that_input_is_known():
+    u, v, y = two_inputs(np.random.default_rng(4), 0.03)
+    hidden = misfit(v, y, delay=0.0, band=(0.001, 0.2))
+    found = misfit(v, y, delay=0.0, band=(0.001, 0.2), others=[(u, 40.0)])
+    assert found.probability < 1e-12 < 1e-6 < hidden.probability
+
+
+@pytest.mark.few(150)
+def test_another_input_does_not_make_noise_significant(seeds):
+    found = []
+    for seed in range(2 * seeds):
+        u, v, y = two_inputs(np.random.default_rng(seed), 0.0)
+        y = y + np.random.default_rng(seed + 1).standard_normal(N)
+        found.append(misfit(v, y, delay=0.0, band=(0.001, 0.2), others=[(u, 40.0)]).probability)
+    assert np.mean(np.array(found) < 0.01) <= 0.02
+    assert np.mean(found) == pytest.approx(0.5, abs=0.1)

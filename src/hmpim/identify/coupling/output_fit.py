@@ -302,13 +302,14 @@ def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int
     found: dict[int, float] = {}
     sums: set[int] = set()
     rare = FALSE_ALARM / max(len(waiting), 1)
+    strong = [(inputs[i], pairs.fits[i].best.fit.delay) for i in pairs.strong]
     for j in waiting:
         rest = bridged(pairs.without_others(j) - constant, counted)
         least = PART * max(float(np.std(rest)), 1e-300)
         share = _follows_at_all(inputs[j], rest)
         if share > least:
             band = excited_band(inputs[j], 1.0)
-            if misfit_at_any_lag(inputs[j], rest, band).probability < rare:
+            if misfit_at_any_lag(inputs[j], rest, band, strong).probability < rare:
                 found[j] = share
         elif (share := _sum_in(inputs[j], rest, rare)) > least:
             found[j] = share

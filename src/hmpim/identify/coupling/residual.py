@@ -7,14 +7,18 @@ import numpy as np
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.misfit import Misfit, misfit
+from hmpim.identify.noise.misfit import Delayed, Misfit, misfit
 from hmpim.identify.section_iv.correlation import likeness
 
 __all__ = ["misfit_at_any_lag", "misfits_of_inputs"]
 
 
-def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
+def misfit_at_any_lag(
+    u: Real, y: Real, band: tuple[float, float], others: Sequence[Delayed] = ()
+) -> Misfit:
     """Test whether an output follows an input, at the lag at which they are most alike.
+
+    What follows the other inputs, each with its delay in samples, is not counted.
 
     The record is tested as it is, and after Hann's window. The transient at the record's beginning
     can hide a response from the first test, a weak middle of the record from the second. After the
@@ -24,10 +28,16 @@ def misfit_at_any_lag(u: Real, y: Real, band: tuple[float, float]) -> Misfit:
     lag = likeness(u, y, u.size // 2 - 1).lag
     half = u.size // 2
     window = np.hanning(u.size)
-    late = np.concatenate([np.zeros(lag), (u - u.mean())[: u.size - lag]])
-    pair = window * late, window * (y - y.mean())
-    folded = [part[:half] + part[half : 2 * half] for part in pair]
-    tests = misfit(u, y, delay=float(lag), band=band), misfit(*folded, delay=0.0, band=band)
+
+    def folded(x: Real, late: int = 0) -> Real:
+        shifted = np.concatenate([np.zeros(late), (x - x.mean())[: x.size - late]]) * window
+        return np.asarray(shifted[:half] + shifted[half : 2 * half])
+
+    known = [(folded(x, max(round(late), 0)), 0.0) for x, late in others]
+    tests = (
+        misfit(u, y, delay=float(lag), band=band, others=others),
+        misfit(folded(u, lag), folded(y), delay=0.0, band=band, others=known),
+    )
     significant = [test for test in tests if test.probability < FALSE_ALARM] or tests
     return Misfit(
         share=max(test.share for test in significant),

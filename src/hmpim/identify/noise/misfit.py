@@ -1,5 +1,6 @@
 """Whether a residual still follows the input."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,7 +12,10 @@ from hmpim.identify.kept import kept
 from hmpim.identify.noise.spectra import transform_of, windowed_power
 from hmpim.identify.worth import DEEPEST, PART
 
-__all__ = ["Misfit", "misfit", "misfits", "unexplained_response"]
+__all__ = ["Delayed", "Misfit", "misfit", "misfits", "unexplained_response"]
+
+Delayed = tuple[Real, float]
+"""A signal, (n,), and a delay in samples."""
 
 _GROUPS = 24
 """Most groups of neighbouring bins in the band."""
@@ -31,13 +35,23 @@ class Misfit:
     probability: float = 1.0  # chance of so much, or more, if the model were right
 
 
-def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) -> Misfit:
+def misfit(
+    u: Real,
+    residual: Real,
+    *,
+    delay: float,
+    band: tuple[float, float],
+    others: Sequence[Delayed] = (),
+) -> Misfit:
     """Test whether the residual is still coherent with the input.
 
     The residual's spectrum is divided into groups of neighbouring bins, and in each one complex
     gain from the input is fitted. If the model is right, that gain explains two degrees of freedom
     of the noise in the same group, whatever its colour. The input is moved by the delay, in
     samples, so that the gain is smooth over a group. The excited band is in cycles per sample.
+
+    Each of the other inputs, with its delay in samples, has a gain of its own in each group: what
+    their models lack would otherwise count as noise.
 
     If the input consists of a few lines, neighbouring bins have no gain in common, and steeply
     coloured noise would look like one. Then the power at the lines is compared with that next to
@@ -49,7 +63,10 @@ def misfit(u: Real, residual: Real, *, delay: float, band: tuple[float, float]) 
     stimulus = transform_of(u)
     bins = min(1 << int(band[1] * u.size + 1).bit_length(), stimulus.size)
     spectra, delays = _transform(residual, bins)[None], np.array([delay])
-    found = misfits(stimulus[:bins], spectra, samples=u.size, delays=delays, band=band)
+    known = [(transform_of(other)[:bins], late - delay) for other, late in others]
+    found = misfits(
+        stimulus[:bins], spectra, samples=u.size, delays=delays, band=band, others=known
+    )
     followed, inside, probability = (float(values[0]) for values in found)
     total = 0.5 * u.size * float(residual @ residual)  # of the bins above 0
     return Misfit(
@@ -96,17 +113,24 @@ def _transform(residual: Real, bins: int) -> Complex:
 
 
 def misfits(
-    stimulus: Complex, residuals: Complex, *, samples: int, delays: Real, band: tuple[float, float]
+    stimulus: Complex,
+    residuals: Complex,
+    *,
+    samples: int,
+    delays: Real,
+    band: tuple[float, float],
+    others: Sequence[tuple[Complex, float]] = (),
 ) -> tuple[Real, Real, Real]:
     """Test many residuals of one input as `misfit` does one.
 
     Returned are the power that follows the input, that within the band, and the probability, (k,).
 
     `stimulus`, (m,), is the transform of the input less its mean, `residuals`, (k, m), those of the
-    residuals, and `delays`, (k,), are in samples.
+    residuals, and `delays`, (k,), are in samples. `others` holds transforms of other inputs, (m,),
+    each with the samples by which its response is later.
     """
     power, taken, total, width = _followed(
-        stimulus, residuals, samples=samples, delays=delays, band=band
+        stimulus, residuals, samples=samples, delays=delays, band=band, others=others
     )
     if not power.size:
         return np.zeros(delays.size), np.zeros(delays.size), np.ones(delays.size)
@@ -125,24 +149,36 @@ def misfits(
 
 
 def _followed(
-    stimulus: Complex, answers: Complex, *, samples: int, delays: Real, band: tuple[float, float]
+    stimulus: Complex,
+    answers: Complex,
+    *,
+    samples: int,
+    delays: Real,
+    band: tuple[float, float],
+    others: Sequence[tuple[Complex, float]] = (),
 ) -> tuple[Real, Real, Real, int]:
     """Explain each answer by one gain from the input in each group of neighbouring bins.
 
     Returned are the power of the input in each group, (g,), the explained and the total power of
-    each answer, both (k, g), and the number of bins in a group. A band with too few bins has no
-    groups.
+    each answer, both (k, g), and the number of bins in a group, all without what one gain from each
+    of the `others` explains. A band with too few bins has no groups.
     """
     count, n = answers.shape[0], samples
     first = max(int(np.ceil(band[0] * n)), 1)
     last = min(int(band[1] * n), stimulus.size - 1)
-    width = max((last + 1 - first) // _GROUPS, 4)
+    width = max((last + 1 - first) // _GROUPS, 4 + len(others))
     groups = max(last + 1 - first, 0) // width
     bins = np.arange(first, first + groups * width)
     U = stimulus[bins].reshape(groups, width)
     E = (answers[:, bins] * np.exp((2j * np.pi / n) * np.outer(delays, bins))).reshape(
         count, groups, width
     )
+    if others and groups:
+        known = np.stack([x[bins] * np.exp(-2j * np.pi / n * late * bins) for x, late in others])
+        basis = np.linalg.qr(known.reshape(-1, groups, width).transpose(1, 2, 0))[0]
+        U = U - np.einsum("gwm,gvm,gv->gw", basis, basis.conj(), U, optimize=True)
+        E = E - np.einsum("gwm,gvm,kgv->kgw", basis, basis.conj(), E, optimize=True)
+        width -= len(others)
     power = np.sum(np.abs(U) ** 2, axis=1)
     along = np.sum(U.conj() * E, axis=2) / np.sqrt(np.where(power > 0, power, 1.0))
     taken = along.real**2 + along.imag**2  # of any unit
