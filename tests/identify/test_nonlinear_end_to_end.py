@@ -1,6 +1,7 @@
 """What `identify` says of systems that are not linear, stepped in time, and of linear ones."""
 
 import importlib
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ def sweep(t: np.ndarray) -> np.ndarray:
     return np.sin(2 * np.pi * (0.1 * inside + 19.9 / 20 * inside**2)) / (1 + 0.3 * inside)
 
 
+@cache
 def motion(kind: str, size: float) -> np.ndarray:
     """Second order, 10 Hz, ζ 0.4, delay 30 ms, by semi-implicit Euler."""
     omega, step = 2 * np.pi * 10.0, 1 / FS / SUBSTEPS

@@ -85,6 +85,12 @@ def assert_answered(seed):
             assert max(map(len, said), default=0) < 500
 
 
-@pytest.mark.parametrize("seed", [*range(12), *in_studies(*range(12, 2000))])
+QUICK = [seed for seed in range(13) if seed not in (2, 6, 7)]
+"""The first but those that take as long as all others together."""
+
+
+@pytest.mark.parametrize(
+    "seed", [*QUICK, *in_studies(*(seed for seed in range(2000) if seed not in QUICK))]
+)
 def test_an_odd_record_is_answered_or_refused(seed):
     assert_answered(seed)

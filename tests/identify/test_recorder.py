@@ -94,7 +94,10 @@ def test_two_inputs_are_each_mended():
     u, w = U.copy(), v.copy()
     u[900] += 30.0
     w[1200] -= 20.0
-    result = hmpim.identify(hmpim.Record.from_arrays({"u": u, "v": w}, {"y": y}, fs=FS))
+    result = hmpim.identify(
+        hmpim.Record.from_arrays({"u": u, "v": w}, {"y": y}, fs=FS),
+        structures=["first_order", "second_order"],
+    )
     assert [warning.code for warning in result["y", "u"].warnings].count("input_spikes") == 2
     assert result["y", "u"].delay.value == pytest.approx(0.02, abs=5e-4)
     assert result["y", "v"].delay.value == pytest.approx(0.01, abs=2e-3)

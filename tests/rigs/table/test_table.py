@@ -152,7 +152,8 @@ def test_feedforward_commands_are_kept_and_never_fitted(mode):
     assert [c.name for c in record.inputs] == ["roll.command"]
     for channel, name in zip(record.auxiliary, ("velocity", "acceleration"), strict=False):
         np.testing.assert_array_equal(channel.values, getattr(stimulus, name))
-    assert len(identify(record).pairs) == 1
+    # How many pairs there are does not depend on what is tried.
+    assert len(identify(record, structures=["static"], nonlinear="reported").pairs) == 1
 
 
 @pytest.fixture(scope="module")
