@@ -167,7 +167,7 @@ def test_a_limit_of_speed_is_no_change_of_the_gain():
         steps[k] = now
     y = steps[::8] + 0.01 * np.random.default_rng(0).standard_normal(2000)
     record = hmpim.Record.from_arrays({"u": u[::8]}, {"y": y}, fs=FS, intersample="bandlimited")
-    assert not of_gain(hmpim.identify(record, structures=["static", "second_order"])["y", "u"])
+    assert not of_gain(hmpim.identify(record, structures=["static", "third_order"])["y", "u"])
 
 
 def test_the_prediction_has_the_change_and_none_of_the_noise():
