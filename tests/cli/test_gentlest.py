@@ -17,7 +17,7 @@ from tests_support import search_coarsely
 
 ROUGH = [
     *("--natural-frequency", "10", "--damping", "0.4", "--delay", "0.15", "--noise", "0.1"),
-    *("--fs", "200", "--amplitude", "10", "--unit", "deg", "--duration", "3"),
+    *("--fs", "200", "--amplitude", "10", "--unit", "deg", "--duration", "2"),
     *("--family", "multisine"),
 ]
 
@@ -43,7 +43,7 @@ def test_to_files_with_a_picture_of_the_trade(tmp_path):
     data = json.loads((tmp_path / "s.json").read_text())
     lines = (tmp_path / "s.csv").read_text().splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    assert len(rows) == data["stimulus"]["samples"] == 600
+    assert len(rows) == data["stimulus"]["samples"] == 400
     largest = max(abs(float(row["acceleration"])) for row in rows)
     assert 0.8 * data["value"] <= largest <= data["value"] == data["peaks"]["acceleration"]
     errors = data["errors"]["natural_frequency"]
@@ -62,7 +62,7 @@ def test_what_cannot_be_met_is_said_with_exit_code_1(tmp_path):
     sweep = (*ROUGH[:-1], "sweep")  # refused in a quarter of a multisine's time
     out = run(*sweep, "--max-acceleration", "50", "-o", str(tmp_path / "s.csv"))
     assert out.exit_code == 1
-    assert "the accuracy cannot be met inside the limits in 3 s" in out.stderr
+    assert "the accuracy cannot be met inside the limits in 2 s" in out.stderr
     assert "allow errors" in out.stderr
     assert not (tmp_path / "s.csv").exists()
 

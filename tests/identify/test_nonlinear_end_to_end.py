@@ -280,7 +280,7 @@ def test_the_silverbox_hardens_in_one_record_and_over_levels(measured):
             {"u": data["input"][start:stop]}, {"y": data["output"][start:stop]}, fs=fs
         )
 
-    arrow = hmpim.identify(part(28_000, 40_000), structures=PLAIN)["y", "u"]
+    arrow = hmpim.identify(part(28_000, 36_000), structures=PLAIN)["y", "u"]
     assert {"nonlinear", "hardening"} <= codes(arrow)
     assert arrow.verdict == "doubtful"
     assert arrow.nonlinearity.odd > 0.1

@@ -77,7 +77,8 @@ def test_what_the_fit_leaves_over_and_would_be_doubted_for_is_explained():
     [
         ("by chance", 1003, 87),  # a slow pole stood for a drift beside a zero
         ("by chance, more", 1003, 36),  # an integrator that explains nothing left white noise
-        ("two inputs, modes", 1, 0),  # many poles had to leave white noise beside another input
+        # Many poles had to leave white noise beside another input.
+        *in_studies(("two inputs, modes", 1, 0)),
     ],
 )
 def test_a_draw_that_was_doubted_and_wrong_is_right(family, seed, index):

@@ -103,7 +103,7 @@ def test_scripts_simulate_what_is_predicted(name, tool, tmp_path):
 
 
 def test_the_function_of_matlab_simulates_what_is_predicted(tmp_path):
-    t = T[:500]  # Octave is slow in loops
+    t = T[:300]  # Octave is slow in loops
     u = wave(t)
     np.savetxt(tmp_path / "u.txt", np.stack([t, u], axis=1), fmt="%.17g")
     lines = ["d = load('u.txt');"]

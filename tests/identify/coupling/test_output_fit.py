@@ -105,6 +105,7 @@ def test_an_output_that_follows_no_input_is_said_to_be_unrelated():
             {f"u{j}": u for j, u in enumerate(INPUTS)},
             {"y0": noise, "y1": INPUTS[0] + 0.01 * noise[::-1]},
             fs=FS,
+            intersample="bandlimited",
         ),
         structures=PLAIN,
     )
@@ -321,7 +322,7 @@ def test_couplings_to_inputs_that_are_alike_at_low_frequencies_are_both_found(se
         y = y + hmpim.simulate(model, inputs[axis], fs=500.0, intersample="bandlimited")
     driven = {axis: inputs[axis] for axis in models}
     found = hmpim.identify(
-        hmpim.Record.from_arrays(driven, {"y": y}, fs=500.0),
+        hmpim.Record.from_arrays(driven, {"y": y}, fs=500.0, intersample="bandlimited"),
         structures=PLAIN,
     )
     for axis, model in models.items():
@@ -372,6 +373,7 @@ def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
             {"u": u[inside], "copy": copy[inside]},
             {"y": y[inside] + 0.02 * rng.standard_normal(600)},
             fs=100.0,
+            intersample="bandlimited",
         )
     )
     assert found["y", "copy"].verdict == "not_identifiable"

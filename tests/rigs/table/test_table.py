@@ -129,7 +129,7 @@ def test_behind_the_hold_slower_commands_change_nothing(mode):
     truth = exact_bandwidth(table, axis="pitch", fs=500.0)
     assert truth == pytest.approx(exact_bandwidth(table, axis="pitch", fs=1000.0), rel=0.005)
     limits = table.limits_of("pitch", travel=1.5, share=0.95)
-    stimulus = design(band=(0.1, 1.5 * slow), duration=10, fs=500, limits=limits, axis="pitch")
+    stimulus = design(band=(0.1, 1.5 * slow), duration=5, fs=500, limits=limits, axis="pitch")
     found = identified(run(table, stimulus, rng=1), "pitch").bandwidth_phase90
     assert abs(found.value / truth - 1.0) < 0.02
 
