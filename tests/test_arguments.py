@@ -14,6 +14,7 @@ from hmpim.arguments import checked, fits, generator, numbers_of, shown, size_of
 from hmpim.errors import ArgumentError, RecordError
 from hmpim.optimal import Accuracy, ModelRange, RoughModel
 from hmpim.stimulus.axes import AxisPlan
+from tests_support import search_coarsely
 
 NONSENSE = [
     *(None, "x", "200", b"x", (), [], {}, -1, 0, 1e300, math.nan, math.inf, -math.inf, True, 1j),
@@ -264,7 +265,8 @@ TABLE = (
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_nonsense_is_refused_or_works(name, result, files):
+def test_nonsense_is_refused_or_works(name, result, files, monkeypatch):
+    search_coarsely(monkeypatch)
     call, keywords = calls(result)[name]
     for of in keywords:
         check(name, call, keywords, of)

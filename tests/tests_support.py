@@ -14,6 +14,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
@@ -76,6 +77,24 @@ def in_studies(*values) -> list:
 def designed_once(**wish) -> hmpim.Stimulus:
     """The stimulus of a wish, designed once per process: a stimulus is never changed."""
     return hmpim.design(**wish)
+
+
+def search_coarsely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the gentlest stimulus searched for in a few steps, where what is found matters little.
+
+    How good a whole search is, tests/optimal ask.
+    """
+    search = import_module("hmpim.optimal.gentlest")  # its function has the module's name
+    multisine, sweep = search.best_multisine, search.best_sweep
+
+    def few_steps(*arguments, **options):
+        return multisine(*arguments, **{**options, "starts": 1, "steps": 8})
+
+    def few_trials(*arguments, **options):
+        return sweep(*arguments, **{**options, "trials": 10})
+
+    monkeypatch.setattr(search, "best_multisine", few_steps)
+    monkeypatch.setattr(search, "best_sweep", few_trials)
 
 
 def missing(name: str, what: str) -> NoReturn:

@@ -335,7 +335,8 @@ def test_friction_is_modelled_unless_levels_are_compared(tmp_path, monkeypatch, 
 
     def noted(record, *, nonlinear):
         asked.append(nonlinear)
-        return hmpim.identify(record, nonlinear=nonlinear)
+        # What is asked for is looked at, so a quick answer will do.
+        return hmpim.identify(record, structures=["second_order"], nonlinear="reported")
 
     monkeypatch.setattr(module, "identify", noted)
     pytest.importorskip("mujoco")
@@ -357,7 +358,7 @@ def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path):
     """One answer to one question: the campaign's, and that of the record it has kept."""
     pytest.importorskip("mujoco")
     plan = table_plan(level=0.5, seconds=2.0)
-    both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(500.0,), loads=("acceptance",))
+    both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(250.0,), loads=("acceptance",))
     (case,) = run_campaign(replace(plan, tests=(both,)), tmp_path)
     found = hmpim.identify(hmpim.load(tmp_path / "records" / f"{case['id']}.h5"))
     assert [pair["axis"] for pair in case["pairs"]] == ["roll", "yaw"]

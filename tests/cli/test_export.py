@@ -31,6 +31,7 @@ def result(tmp_path_factory):
 @pytest.mark.parametrize("target", sorted(TARGETS))
 def test_every_target_is_written_from_a_result(target, result, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(fmu, "PLATFORMS", fmu.PLATFORMS[:1])
+    monkeypatch.setattr("hmpim.formats.models.isaac._DRAWS", 20)
     place = tmp_path / ("axis" + TARGETS[target].suffix)
     step = ["--timestep", "0.001"] if target in ("mujoco", "isaac") else []
     assert run("export", result, "--to", target, "-o", place, *step) == 0

@@ -9,7 +9,7 @@ from hmpim.cli.main import app
 from hmpim.errors import ArgumentError
 from hmpim.identify import Bounds
 from hmpim.optimal import RoughModel
-from tests_support import in_studies
+from tests_support import in_studies, search_coarsely
 
 DESIGN = {
     "--duration": "5",
@@ -65,7 +65,8 @@ def test_no_number_ends_a_design_in_a_traceback(option, capsys):
 
 
 @pytest.mark.parametrize("option", GENTLEST)
-def test_no_number_ends_a_search_in_a_traceback(option, capsys):
+def test_no_number_ends_a_search_in_a_traceback(option, capsys, monkeypatch):
+    search_coarsely(monkeypatch)
     for value in ("1e308", "1e-308", "nan"):
         code = run("gentlest", *with_number(option, value), "--family", "exponential")
         assert is_said(code, capsys.readouterr().err), value
@@ -78,7 +79,8 @@ SEARCHED = ("--noise", "--max-rate")
 
 
 @pytest.mark.parametrize("option", [*SEARCHED, *in_studies(*sorted({*GENTLEST} - {*SEARCHED}))])
-def test_no_large_number_ends_a_search_in_a_traceback(option, capsys):
+def test_no_large_number_ends_a_search_in_a_traceback(option, capsys, monkeypatch):
+    search_coarsely(monkeypatch)
     code = run("gentlest", *with_number(option, "1e29"), "--family", "exponential")
     assert is_said(code, capsys.readouterr().err)
 

@@ -143,6 +143,7 @@ LONG = {
     *("a record that ends before the response", "a sweep a little different", "gain changes"),
     *(
         "stuck after half",
+        "nearly all clipped",  # effects/test_saturation.py has clipping
         "dynamics change",
         "stuck before half",
         "held for 0.2 s",

@@ -12,6 +12,7 @@ from hmpim.workbench.desks import AxisRow, Model, Wish
 from hmpim.workbench.drawn import MOST, changes, drawn, packed, refilled
 from hmpim.workbench.work.design import error_rows, stimuli_of
 from hmpim.workbench.work.designed import designed, five_axes, spectrum
+from tests_support import search_coarsely
 
 WISH = Wish(rows=(AxisRow(name="roll"),), duration=5.0, fs=200.0, model=Model(wanted=2.0))
 
@@ -47,6 +48,7 @@ def test_limits_are_drawn_as_they_are_and_not_as_the_amplitude_uses_them():
 
 def test_the_gentlest_tells_as_much_as_is_wanted_at_less_acceleration(monkeypatch):
     monkeypatch.setattr("hmpim.workbench.work.design.FAMILIES", ("multisine",))  # one of three
+    search_coarsely(monkeypatch)
     gentle = replace(WISH, gentlest=True)
     (softer,), (full,) = stimuli_of(gentle), stimuli_of(WISH)
     assert softer.peaks.acceleration < 0.2 * full.peaks.acceleration

@@ -159,8 +159,9 @@ def test_another_rate_is_exact_too(tmp_path):
 
 
 @pytest.mark.parametrize("target", ["python", "scipy", "control", "isaac"])
-def test_names_that_python_would_read_otherwise_stand_in_its_text(target, tmp_path):
+def test_names_that_python_would_read_otherwise_stand_in_its_text(target, tmp_path, monkeypatch):
     """A backslash and a triple quote in the names of the channels: the file still compiles."""
+    monkeypatch.setattr("hmpim.formats.models.isaac._DRAWS", 20)
     whole = result_of(SECOND)
     odd = replace(whole.pairs[0], input='u """ \\N{x}', output='C:\\new "y"""')
     step = {"timestep": 0.005} if target == "isaac" else {}

@@ -147,7 +147,8 @@ def test_isaac_names_the_fields_of_the_class_and_the_ranges(tmp_path):
     assert [float(e) for e in ends.groups()] == pytest.approx([0.99804, 1.00196], abs=2e-4)
 
 
-def test_isaac_refuses_what_a_pd_actuator_is_not(tmp_path):
+def test_isaac_refuses_what_a_pd_actuator_is_not(tmp_path, monkeypatch):
+    monkeypatch.setattr("hmpim.formats.models.isaac._DRAWS", 20)
     with pytest.raises(ArgumentError, match="physics step is not known"):
         export(result_of(MODELS["second order"]), to="isaac", path=tmp_path / "x.py")
     with pytest.raises(ArgumentError, match="neither a first-order lag nor of second order"):

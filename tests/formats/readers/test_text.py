@@ -2,6 +2,7 @@
 
 import codecs
 import gzip
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hmpim.errors import FormatError, UnitError
 from hmpim.formats import read
 from hmpim.formats.readers import Layout, reader_for
 from hmpim.formats.readers.text import source
+from tests_support import in_studies
 
 N = 300
 K = np.arange(N)
@@ -205,10 +207,16 @@ def test_every_writing_gives_the_same_numbers(tmp_path, name):
     assert sum(not c.holds for c in contents.channels) - len(channels) <= 2
 
 
-@pytest.mark.parametrize("delimiter", [";", "\t", " ", '","'])
-@pytest.mark.parametrize(
-    ("before", "after"), [(1, 0), (1499, 0), (1600, 0), (70_000, 0), (0, 200), (0, 3000)]
-)
+RESTS = [(1, 0), (1499, 0), (1600, 0), (70_000, 0), (0, 200), (0, 3000)]
+"""How many samples a command rests before it moves, and after."""
+DELIMITERS = [";", "\t", " ", '","']
+RESTING = [(*rest, DELIMITERS[k % 4]) for k, rest in enumerate(RESTS)]
+RESTING += [(70_000, 0, ";"), (0, 3000, '","'), (1499, 0, " ")]
+"""Each rest and each delimiter; the other pairs in `make studies`."""
+OTHERS = [(*r, d) for r, d in product(RESTS, DELIMITERS) if (*r, d) not in RESTING]
+
+
+@pytest.mark.parametrize(("before", "after", "delimiter"), [*RESTING, *in_studies(*OTHERS)])
 def test_whole_numbers_do_not_hide_a_decimal_comma(tmp_path, delimiter, before, after):
     """A command that rests at 0 before or after it moves, in any length of file."""
     values = np.round(np.sin(np.arange(20) / 3), 3)

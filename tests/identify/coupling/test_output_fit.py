@@ -25,6 +25,8 @@ def sweep(first, last):
     return np.sin(2 * np.pi * (first * TIME + (last - first) / 20 * TIME**2))
 
 
+PLAIN = ["static", "first_order", "second_order"]
+"""For tests of what is found of which input, not of which structure is chosen."""
 INPUTS = (sweep(0.1, 20), sweep(0.1, 20)[::-1].copy(), sweep(14, 0.2))
 
 
@@ -103,7 +105,9 @@ def test_an_output_that_follows_no_input_is_said_to_be_unrelated():
             {f"u{j}": u for j, u in enumerate(INPUTS)},
             {"y0": noise, "y1": INPUTS[0] + 0.01 * noise[::-1]},
             fs=FS,
-        )
+            intersample="bandlimited",
+        ),
+        structures=PLAIN,
     )
     for j in range(3):
         assert [w.code for w in found["y0", f"u{j}"].warnings] == ["unrelated"]
@@ -114,7 +118,8 @@ def test_an_output_that_is_one_of_the_inputs_leaves_nothing_to_the_others():
     found = hmpim.identify(
         hmpim.Record.from_arrays(
             {f"u{j}": u for j, u in enumerate(INPUTS)}, {"y": INPUTS[1]}, fs=FS
-        )
+        ),
+        structures=PLAIN,
     )
     assert found["y", "u1"].scale_factor.value == pytest.approx(1.0)
     for j in (0, 2):
@@ -316,7 +321,10 @@ def test_couplings_to_inputs_that_are_alike_at_low_frequencies_are_both_found(se
     for axis, model in models.items():
         y = y + hmpim.simulate(model, inputs[axis], fs=500.0, intersample="bandlimited")
     driven = {axis: inputs[axis] for axis in models}
-    found = hmpim.identify(hmpim.Record.from_arrays(driven, {"y": y}, fs=500.0))
+    found = hmpim.identify(
+        hmpim.Record.from_arrays(driven, {"y": y}, fs=500.0, intersample="bandlimited"),
+        structures=PLAIN,
+    )
     for axis, model in models.items():
         gain, lag = found["y", axis].scale_factor, found["y", axis].delay_low_frequency
         assert gain.value == pytest.approx(model.scale_factor, abs=4 * gain.spread)
@@ -353,7 +361,7 @@ def test_the_weaker_input_is_fitted_again_once_the_leading_one_has_joined():
         assert abs(pair.delay.value - delay) < 1e-3
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [1, *in_studies(0)])
 def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
     rng = np.random.default_rng(seed)
     u = np.convolve(rng.standard_normal(1600), np.hanning(9) / 4, "same")
@@ -365,6 +373,7 @@ def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
             {"u": u[inside], "copy": copy[inside]},
             {"y": y[inside] + 0.02 * rng.standard_normal(600)},
             fs=100.0,
+            intersample="bandlimited",
         )
     )
     assert found["y", "copy"].verdict == "not_identifiable"

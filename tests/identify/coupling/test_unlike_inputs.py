@@ -27,13 +27,13 @@ def model(natural, damping, delay, gain):
     return hmpim.Model(delay=delay, scale_factor=gain, denominator=denominator)
 
 
-def identified(inputs, models, between, disturbance=0.0):
+def identified(inputs, models, between, disturbance=0.0, structures=None):
     rng = np.random.default_rng(11)
     y = 0.5 + disturbance + NOISE * rng.standard_normal(SAMPLES)
     for u, unit, kind in zip(inputs, models, between, strict=True):
         y = y + hmpim.simulate(unit, u, fs=FS, intersample=kind)
     named = {f"u{j}": u for j, u in enumerate(inputs)}
-    return hmpim.identify(hmpim.Record.from_arrays(named, {"y": y}, fs=FS))
+    return hmpim.identify(hmpim.Record.from_arrays(named, {"y": y}, fs=FS), structures=structures)
 
 
 def test_what_moves_the_output_little_is_found_with_its_dynamics_where_noise_is_less():
@@ -80,7 +80,13 @@ HUM = 0.05 * np.sin(2 * np.pi * 23.3 * TIME + 1.0)
 )
 def test_a_drift_and_a_hum_are_fitted_beside_several_inputs(disturbance, codes):
     models = (model(6.0, 0.5, 0.021, 1.0), model(4.0, 0.8, 0.033, 0.3))
-    found = identified((sweep(), binary(3, 5)), models, ("bandlimited", "zoh"), disturbance)
+    found = identified(
+        (sweep(), binary(3, 5)),
+        models,
+        ("bandlimited", "zoh"),
+        disturbance,
+        structures=["first_order", "second_order"],
+    )
     for pair, unit in zip(found.pairs, models, strict=True):
         assert codes <= {finding.code for finding in pair.warnings}
         assert pair.noise_std.value == pytest.approx(NOISE, rel=0.08)

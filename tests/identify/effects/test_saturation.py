@@ -49,7 +49,7 @@ def ideal_response(dynamics, name, held):
 
 
 @pytest.mark.parametrize("dynamics", DYNAMICS, ids=str)
-@pytest.mark.parametrize("step", [None, 0.003, 0.05, 0.2])
+@pytest.mark.parametrize("step", [None, 0.05, *in_studies(0.003, 0.2)])
 @pytest.mark.parametrize("noise", [0.0, 0.02, *in_studies(0.002, 0.1)])
 def test_nothing_is_clipped_that_is_not(dynamics, step, noise):
     for name, u in INPUTS.items():

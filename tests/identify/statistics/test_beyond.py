@@ -14,7 +14,7 @@ from hmpim.identify.statistics.beyond import held_for
 from hmpim.identify.statistics.products import Products, Responses
 from hmpim.identify.statistics.reach import AHEAD
 from hmpim.identify.statistics.run import Run, cubes_by, of_cubes
-from tests_support import assert_share
+from tests_support import assert_share, in_studies
 
 FS = 200.0
 MODEL = hmpim.Model(
@@ -46,7 +46,8 @@ def kept_for(y, count):
 
 
 def codes(statistics):
-    return [finding.code for finding in identify(statistics)["y", "u"].warnings]
+    plain = identify(statistics, structures=["second_order"])
+    return [finding.code for finding in plain["y", "u"].warnings]
 
 
 @pytest.mark.few(10)
@@ -65,7 +66,8 @@ def test_a_linear_system_is_not_accused(seeds, colour):
 @pytest.mark.few(3)
 def test_a_dead_zone_is_doubted(seeds):
     for seed in range(seeds):
-        pair = identify(compress(answered(swept(), seed, bent=dead_zone)))["y", "u"]
+        statistics = compress(answered(swept(), seed, bent=dead_zone))
+        pair = identify(statistics, structures=["second_order"])["y", "u"]
         assert pair.verdict == pair.scale_factor.verdict == "doubtful"
         (found,) = (finding for finding in pair.warnings if finding.code == "nonlinear")
         assert found.severity == "doubt"
@@ -81,7 +83,7 @@ def test_a_binary_input_tells_nothing_of_it():
     assert "nonlinear" not in codes(compress(record))
 
 
-@pytest.mark.parametrize("count", [3, 8])
+@pytest.mark.parametrize("count", [3, *in_studies(8)])
 def test_a_held_output_is_doubted(count):
     record = answered(swept(3000))
     held = kept_for(record.outputs[0].values, count)
@@ -195,7 +197,8 @@ def test_a_file_of_before_is_read_and_joined(tmp_path):
     old = hmpim.load(tmp_path / "old.h5")
     assert "nonlinear" in codes(new)
     assert "nonlinear" not in codes(old)
-    here, there = identify(new)["y", "u"].delay, identify(old)["y", "u"].delay
+    plain = {"structures": ["second_order"]}
+    here, there = (identify(which, **plain)["y", "u"].delay for which in (new, old))
     assert here.value == there.value
     joined = old + compress(answered(swept(), 2, bent=dead_zone), lags=150)
     assert joined.nbytes < new.nbytes + old.nbytes

@@ -106,7 +106,8 @@ def test_a_spring_that_would_not_return_leaves_the_linear_part_and_says_so():
 
 
 def test_a_nonlinearity_that_is_no_part_of_the_model_is_named():
-    result = hmpim.identify(recorded(chirp(), moved("backlash", chirp()), 1), nonlinear="reported")
+    record = recorded(chirp(), moved("backlash", chirp()), 1)
+    result = hmpim.identify(record, structures=["second_order"], nonlinear="reported")
     pair = result["y", "u"]
     assert pair.nonlinear_part is None
     (said,) = hmpim.predict(pair, recorded(binary(7), moved("backlash", binary(7)), 2)).findings

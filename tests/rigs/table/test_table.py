@@ -93,8 +93,8 @@ def test_encoders_read_the_truth_to_their_resolution():
     assert gap[:, 1].std() == pytest.approx(0.003 / np.sqrt(12), rel=0.1)
 
 
-EACH = [("roll", "PVA"), ("yaw", "P"), ("azimuth", "P"), ("elevation", "P")]
-"""Each axis and each mode, pitch in PV below; the others in `make studies`."""
+EACH = [("roll", "PVA"), ("elevation", "P")]
+"""The fastest axis, the slowest and each mode, pitch in PV below; the others in `make studies`."""
 OTHERS = [case for case in product(AXES, MODES) if case not in EACH]
 
 
@@ -129,7 +129,7 @@ def test_behind_the_hold_slower_commands_change_nothing(mode):
     truth = exact_bandwidth(table, axis="pitch", fs=500.0)
     assert truth == pytest.approx(exact_bandwidth(table, axis="pitch", fs=1000.0), rel=0.005)
     limits = table.limits_of("pitch", travel=1.5, share=0.95)
-    stimulus = design(band=(0.1, 1.5 * slow), duration=10, fs=500, limits=limits, axis="pitch")
+    stimulus = design(band=(0.1, 1.5 * slow), duration=5, fs=500, limits=limits, axis="pitch")
     found = identified(run(table, stimulus, rng=1), "pitch").bandwidth_phase90
     assert abs(found.value / truth - 1.0) < 0.02
 
@@ -152,7 +152,8 @@ def test_feedforward_commands_are_kept_and_never_fitted(mode):
     assert [c.name for c in record.inputs] == ["roll.command"]
     for channel, name in zip(record.auxiliary, ("velocity", "acceleration"), strict=False):
         np.testing.assert_array_equal(channel.values, getattr(stimulus, name))
-    assert len(identify(record).pairs) == 1
+    # How many pairs there are does not depend on what is tried.
+    assert len(identify(record, structures=["static"], nonlinear="reported").pairs) == 1
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,7 @@
 """Exact responses: against the simulation itself, Fig. 4, and what the field knows."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hmpim.errors import ArgumentError
 from hmpim.rigs.table import AXES, FIG_4, MotionTable, Rigid, TablePosition, exact_bandwidth
 from hmpim.rigs.table import linear_response as exact
 from hmpim.stimulus import Limits, Sine, Stimulus
+from tests_support import in_studies
 
 pytest.importorskip("mujoco")
 
@@ -30,18 +32,24 @@ def lock_in(table, axis, frequency, fs, amplitude):
     return phasor / (-1j * amplitude)
 
 
-@pytest.mark.parametrize("mode", ["P", "PV", "PVA"])
+SINES = {
+    "roll": (31.0, 1000.0, 1e-2),
+    "yaw": (60.0, 500.0, 1e-3),
+    "pitch": (17.0, 500.0, 1e-2),
+    "azimuth": (9.0, 1000.0, 1e-3),
+    "elevation": (24.0, 1000.0, 1e-3),
+}
+"""Frequency in Hz, commands in Hz and amplitude in deg of the sine of each axis."""
+EACH = [("roll", "PVA"), ("yaw", "P"), ("pitch", "PV"), ("azimuth", "P"), ("elevation", "PVA")]
+"""Each axis and each mode; the others in `make studies`."""
+
+
 @pytest.mark.parametrize(
-    ("axis", "frequency", "fs", "amplitude"),
-    [
-        ("roll", 31.0, 1000.0, 1e-2),
-        ("yaw", 60.0, 500.0, 1e-3),
-        ("pitch", 17.0, 500.0, 1e-2),
-        ("azimuth", 9.0, 1000.0, 1e-3),
-        ("elevation", 24.0, 1000.0, 1e-3),
-    ],
+    ("axis", "mode"),
+    [*EACH, *in_studies(*(c for c in product(SINES, ("P", "PV", "PVA")) if c not in EACH))],
 )
-def test_linear_response_is_what_the_simulation_does(mode, axis, frequency, fs, amplitude):
+def test_linear_response_is_what_the_simulation_does(axis, mode):
+    frequency, fs, amplitude = SINES[axis]
     table = replace(
         SMOOTH, mode=mode, start=OFF_CENTRE, uut_load="bracket", target_load="projector"
     )

@@ -208,9 +208,9 @@ def test_a_stimulus_at_another_rate_is_refused_before_anything_moves():
 def test_a_heavy_axis_is_waited_for_while_it_says_that_it_brakes():
     """From 150 deg/s with 45 deg/s² it takes more than 3 s."""
     heavy = Limits(position=900.0, velocity=200.0, acceleration=45.0, unit="deg")
-    far = FarEnd(replace(hello(axes=("roll",)), limits={"roll": heavy}))
+    far = FarEnd(replace(hello(rate=100.0, axes=("roll",)), limits={"roll": heavy}))
     slow = design(
-        band=(0.03, 0.06), duration=40, fs=500, axis="roll", extinction=0.0,
+        band=(0.03, 0.06), duration=40, fs=100, axis="roll", extinction=0.0,
         limits=Limits(velocity=150, acceleration=44, unit="deg"),
     )  # fmt: skip
     clock = ManualClock()
