@@ -84,8 +84,11 @@ def assert_answered(seed):
             assert max(map(len, said), default=0) < 500
 
 
-QUICK = [seed for seed in range(13) if seed not in (2, 6, 7)]
-"""The first but those that take as long as all others together."""
+QUICK = [*(seed for seed in range(13) if seed not in (2, 6, 7)), 146]
+"""The first but those that take as long as all others together.
+
+In 146, levels are fitted to noise: a time constant must stay within reach of the record.
+"""
 
 
 @pytest.mark.parametrize("seed", QUICK)

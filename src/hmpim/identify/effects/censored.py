@@ -20,7 +20,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.effects.held import held_prediction, rows_at_updates
 from hmpim.identify.effects.hold import Updates
 from hmpim.identify.effects.saturation import Saturation
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, bounded_for, fit_structure
 from hmpim.identify.fitting.least_squares import inverted
 from hmpim.identify.noise.autoregression import autoregression, spectrum_of_filter
 from hmpim.identify.noise.whiteness import is_white
@@ -255,7 +255,9 @@ def _moved(data: _Data, state: _State, step: Real) -> _State | None:
     excess = max(float(np.max(np.abs(step[:unknown]) / room)), abs(float(step[-1])) / 2.0, 1.0)
     step = step / excess
     step[-2] -= float(state.level @ step[:-1])
-    moved = replace(fit, theta=fit.theta + step[:unknown], linear=fit.linear + step[unknown:-1])
+    theta = fit.theta + step[:unknown]
+    theta[1:] = bounded_for(data.problem, fit.structure, theta)[1:]
+    moved = replace(fit, theta=theta, linear=fit.linear + step[unknown:-1])
     if not data.problem.shortest_delay <= moved.delay <= data.problem.longest_delay:
         return None
     floor = np.log(_LEAST_NOISE * max(float(np.std(data.y)), np.finfo(float).tiny))
