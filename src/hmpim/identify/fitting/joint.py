@@ -48,6 +48,8 @@ from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["chosen_of", "fit_likeliest", "joint_fit"]
 
+_TINY = float(np.finfo(float).tiny)
+
 _LOOKS = 2
 """How often the samples that count are reconsidered, once there is a structure."""
 
@@ -226,14 +228,14 @@ def try_neighbours(
     second one. The likeliest result leads.
     """
     leading, hidden, rivals = joint.best, joint.hidden, list[Trial]()
-    mirrored = _mirrored(joint, course)
-    found = [*joint.trials, *mirrored]
-    for trial in (joint.best, *mirrored, *_others_to_grow(joint, course.natural)):
+    images = _mirrored(joint, course)
+    found = [*joint.trials, *images]
+    for trial in (joint.best, *images, *_others_to_grow(joint, course.natural)):
         grown, further, test = _grown_from(joint, trial, course, structures)
         found += grown
         rivals += further
         likeliest = (trial, *grown)[-1]
-        is_new = bool(grown) or trial in mirrored
+        is_new = bool(grown) or trial in images
         if trial is joint.best or (is_new and likeliest.criterion < leading.criterion):
             leading, hidden = likeliest, test
     if hidden is not None and SECOND_ZERO in structures:
@@ -259,7 +261,8 @@ def _is_better(rival: Trial, leading: Trial, joint: JointFit) -> bool:
     """Whether a richer fit is better than the leading one by more than chance."""
     count = joint.weighed.counted * joint.weighed_share
     richer = rival.fit.structure.parameters > leading.fit.structure.parameters
-    gain = count * float(np.log(leading.fit.objective / rival.fit.objective))
+    own, other = (max(trial.fit.objective, _TINY) for trial in (leading, rival))
+    gain = count * float(np.log(own / other))
     return richer and gain >= ONE_SIDED**2
 
 

@@ -45,7 +45,7 @@ def mirrored(problem: Problem, fit: Fit, *, hopeless: float) -> list[Fit]:
     if structure.zeros == structure.dc_zeros or structure.parallel or structure.sampled:
         return found
     zeros = np.roots(fit.numerator[structure.dc_zeros :][::-1])
-    for lead in -1.0 / zeros.real[zeros.imag == 0.0]:
+    for lead in -1.0 / zeros.real[(zeros.imag == 0.0) & (zeros.real != 0.0)]:
         start = np.append(fit.theta[0] - 2.0 * lead, fit.theta[1:])
         other = fit_structure(problem, structure, start, hopeless=hopeless)
         if other.objective < hopeless and abs(other.delay - fit.delay) > abs(lead):
