@@ -243,7 +243,8 @@ def try_neighbours(
         problem = course.data.problem(mode, course.counted)
         seconds = _trials_of(joint, mode, second_zeros(problem, leading.fit, hidden))
         found += seconds
-        likeliest = min([leading, *seconds], key=lambda trial: trial.criterion)
+        white = (trial for trial in seconds if trial.fit.is_white)
+        likeliest = min([leading, *white], key=lambda trial: trial.criterion)
         if likeliest is not leading:
             leading, hidden = likeliest, course.data.hidden_pole(problem, likeliest.fit)
     asked = [rival for rival in rivals if _is_better(rival, leading, joint)]
