@@ -77,7 +77,7 @@ def test_a_second_zero_is_fitted_in_either_half_plane():
     assert delays[1] == pytest.approx(DELAY, abs=0.2)
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(4)
 @pytest.mark.parametrize("noise", [0.003, 0.012])
 def test_the_delay_of_a_servo_with_two_zeros_is_in_its_interval(noise, seeds):
     """The noise hides the sign of the second zero, or all of it: the delay is a sample off."""
