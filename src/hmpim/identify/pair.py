@@ -21,7 +21,7 @@ from hmpim.identify.effects.drift import drift_findings
 from hmpim.identify.effects.findings import with_imperfections
 from hmpim.identify.effects.hum import hum_finding
 from hmpim.identify.effects.imperfections import Imperfections, refine
-from hmpim.identify.fitting.fit import Fit
+from hmpim.identify.fitting.fit import Fit, delayed
 from hmpim.identify.fitting.plainer import plainer
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.frf.local import local_response
@@ -297,9 +297,8 @@ def _evidence(
     bending = joined.bending_of(own.i)
     if bending is not None:
         others.extend(bending.others.values())
-    later = np.arange(fit.theta.size) == 0
     if own.i in question.later:
-        others.append(replace(fit, theta=fit.theta + question.later[own.i] * later))
+        others.append(replace(fit, theta=delayed(fit.theta, question.later[own.i])))
     whole = spanned(
         readings.parameters,
         joint,

@@ -142,7 +142,7 @@ def changing_gain(first: JointFit, fitted: _Fitted, otherwise: _Share) -> GainCh
 
 def _first_scores(first: JointFit, otherwise: _Share) -> tuple[tuple[Scored, ...], float]:
     """Scores to start from, none if no test is significant; and the share that they explain."""
-    count, best = first.weighed.counted * first.weighed_share, first.best.fit
+    count, best = first.counted, first.best.fit
     own = scored(first.weighed, best, count)
     lead = max(own, key=lambda one: one.gain, default=None)
     if lead is None or lead.gain <= searched(len(own)) or abs(lead.change) <= WORTH:

@@ -20,7 +20,7 @@ from hmpim.identify.fitting.enrich import (
     with_fit,
     without_fast,
 )
-from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, bounded_for, fit_structure
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, bounded_for, delayed, fit_structure
 from hmpim.identify.fitting.growth import FEW_POLES, one_more_pole, scale_of, with_pole
 from hmpim.identify.fitting.held_steps import is_all_behind_hold, steps_through
 from hmpim.identify.fitting.modes import grown_modes
@@ -148,7 +148,7 @@ def _slipped(rough: RoughResponse, theta: Real) -> list[Real]:
     """
     mean = float(np.sqrt(rough.weight @ rough.omega**2 / rough.weight.sum()))
     steps = np.pi / mean * np.array([k for k in range(-_SLIPS, _SLIPS + 1) if k])
-    return [np.append(theta[0] + step, theta[1:]) for step in steps]
+    return [delayed(theta, step) for step in steps]
 
 
 def fit_rich(
@@ -400,7 +400,7 @@ def in_best_sample(problem: Problem, best: Fit) -> Fit:
         return best
     for step in (-1.0, 1.0):
         while True:
-            start = np.append(best.theta[0] + step, best.theta[1:])
+            start = delayed(best.theta, step)
             hopeless = TWICE * best.objective
             other = fit_structure(problem, best.structure, start, hopeless=hopeless)
             if not other.objective < best.objective:

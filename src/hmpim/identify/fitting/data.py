@@ -7,7 +7,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import FALSE_ALARM, SEARCHED
-from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.start import RoughResponse, rough_response
@@ -150,7 +150,7 @@ def follows(data: Data, fit: Fit) -> bool:
 def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
     """Parameters as a start under another assumption: a held input has half a sample less delay."""
     sooner = 0.5 * (float(is_held(origin)) - float(is_held(mode)))
-    return np.asarray(theta + sooner * (np.arange(theta.size) == 0))
+    return delayed(theta, sooner)
 
 
 def polished(problem: Problem, fit: Fit, *, hopeless: float = np.inf) -> Fit:

@@ -34,6 +34,7 @@ __all__ = [
     "Fit",
     "Problem",
     "bounded_for",
+    "delayed",
     "evaluating",
     "fit_structure",
     "fit_together",
@@ -320,6 +321,17 @@ def _reach(sections: tuple[int, ...], samples: int) -> tuple[Real, Real]:
         each += [span, _SHAPES][:order]
     least, most = np.array(each).T
     return least, most
+
+
+def delayed(theta: Real, later: float) -> Real:
+    """The same parameters, with a delay that is longer by so many samples.
+
+    Examples
+    --------
+    >>> delayed(np.array([3.0, 0.5]), 1.5).tolist()
+    [4.5, 0.5]
+    """
+    return np.append(theta[0] + later, theta[1:])
 
 
 def fit_structure(

@@ -48,8 +48,6 @@ from hmpim.record import BETWEEN, Intersample
 
 __all__ = ["chosen_of", "fit_likeliest", "joint_fit"]
 
-_TINY = float(np.finfo(float).tiny)
-
 _LOOKS = 2
 """How often the samples that count are reconsidered, once there is a structure."""
 
@@ -227,18 +225,17 @@ def try_neighbours(
     other trials. Delay may also have put a zero into the wrong half plane, or replaced a servo's
     second one. The likeliest result leads.
     """
-    leading, hidden, rivals = joint.best, joint.hidden, list[Trial]()
+    rivals, ends = list[Trial](), list[tuple[Trial, HiddenPole]]()
     images = _mirrored(joint, course)
     found = [*joint.trials, *images]
     for trial in (joint.best, *images, *_others_to_grow(joint, course.natural)):
         grown, further, test = _grown_from(joint, trial, course, structures)
         found += grown
         rivals += further
-        likeliest = (trial, *grown)[-1]
-        is_new = bool(grown) or trial in images
-        if trial is joint.best or (is_new and likeliest.criterion < leading.criterion):
-            leading, hidden = likeliest, test
-    if hidden is not None and SECOND_ZERO in structures:
+        if grown or trial is joint.best or trial in images:
+            ends.append(((trial, *grown)[-1], test))
+    leading, hidden = min(ends, key=lambda end: end[0].criterion)
+    if SECOND_ZERO in structures:
         mode = leading.intersample
         problem = course.data.problem(mode, course.counted)
         seconds = _trials_of(joint, mode, second_zeros(problem, leading.fit, hidden))
@@ -254,24 +251,20 @@ def try_neighbours(
 
 def _trials_of(joint: JointFit, mode: Intersample, fits: Iterable[Fit]) -> list[Trial]:
     """Fits to all that a joint fit counts, with Schwarz's criterion."""
-    count = joint.weighed.counted * joint.weighed_share
-    return [trial_of(mode, fit, count) for fit in fits]
+    return [trial_of(mode, fit, joint.counted) for fit in fits]
 
 
 def _is_better(rival: Trial, leading: Trial, joint: JointFit) -> bool:
     """Whether a richer fit is better than the leading one by more than chance."""
-    count = joint.weighed.counted * joint.weighed_share
     richer = rival.fit.structure.parameters > leading.fit.structure.parameters
-    own, other = (max(trial.fit.objective, _TINY) for trial in (leading, rival))
-    gain = count * float(np.log(own / other))
-    return richer and gain >= ONE_SIDED**2
+    return richer and joint.gain(rival, leading) >= ONE_SIDED**2
 
 
 def _mirrored(joint: JointFit, course: Course) -> list[Trial]:
     """The best trial with a zero in the other half plane, if that is about as likely."""
-    best, count = joint.best, joint.weighed.counted * joint.weighed_share
+    best = joint.best
     problem = course.data.problem(best.intersample, course.counted)
-    hopeless = best.fit.objective * float(np.exp(2 * CLEARLY / count))
+    hopeless = best.fit.objective * float(np.exp(2 * CLEARLY / joint.counted))
     return _trials_of(joint, best.intersample, mirrored(problem, best.fit, hopeless=hopeless))
 
 
@@ -300,7 +293,6 @@ def _grown_from(
     """Add poles to a trial: trials that beat one another, rivals, and the test of the last one."""
     mode = trial.intersample
     problem = course.data.problem(mode, course.counted)
-    count = problem.counted * joint.weighed_share
 
     def otherwise(given: Fit) -> float:
         most = given.structure.parameters
@@ -312,7 +304,7 @@ def _grown_from(
         problem,
         trial.fit,
         hidden=course.data.hidden_pole,
-        count=count,
+        count=joint.counted,
         names=structures,
         otherwise=otherwise,
     )
@@ -324,14 +316,13 @@ def _with_leading(leading: Trial, joint: JointFit, course: Course) -> JointFit:
     """The joint fit with a grown trial as the best, polished and under each assumption."""
     mode = leading.intersample
     problem = course.data.problem(mode, course.counted)
-    count = problem.counted * joint.weighed_share
     fit = polished(problem, leading.fit)
     trials = [trial for trial in joint.trials if trial is not leading]
     for other in () if course.alone else BETWEEN:
         if other != mode:
             moved = refit_between(course.data.problem(other, course.counted), fit, mode, other)
-            trials.append(trial_of(other, moved, count))
-    best = trial_of(mode, fit, count)
+            trials.append(trial_of(other, moved, joint.counted))
+    best = trial_of(mode, fit, joint.counted)
     fresh = settle(course, [*trials, best], best, joint.effective_share)
     return replace(fresh, rivals=joint.rivals, hidden=joint.hidden)
 

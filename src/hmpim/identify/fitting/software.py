@@ -18,7 +18,7 @@ from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.data import polished, refit
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
 from hmpim.identify.fitting.trial import JointFit, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER, is_unexplainable
@@ -283,7 +283,7 @@ def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit
     for step in (-1.0, 1.0):
         best = min([*own, *found], key=lambda fit: fit.cost)
         while 0.0 <= best.delay + step <= problem.longest_delay and best.delay + step not in known:
-            start = np.append(best.theta[0] + step, best.theta[1:])
+            start = delayed(best.theta, step)
             other = fit_structure(problem, structure, start)
             if not other.cost < best.cost:
                 break

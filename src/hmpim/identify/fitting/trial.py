@@ -15,6 +15,8 @@ from hmpim.record import Intersample
 
 __all__ = ["JointFit", "Trial", "likeliest_of", "schwarz", "trial_of"]
 
+_TINY = float(np.finfo(float).tiny)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trial:
@@ -55,6 +57,16 @@ class JointFit:
         """Independent samples per sample of `weighed`: 1 if the noise is whitened."""
         return self.effective_share if self.weighed.noise is None else 1.0
 
+    @property
+    def counted(self) -> float:
+        """Independent samples with which all trials were compared."""
+        return self.weighed.counted * self.weighed_share
+
+    def gain(self, trial: Trial, former: Trial) -> float:
+        """Twice the log-likelihood that a trial gains over a former one."""
+        before, after = (max(each.fit.objective, _TINY) for each in (former, trial))
+        return float(self.counted * np.log(before / after))
+
     def with_fit(self, fit: Fit) -> "JointFit":
         """The same with another fit of the chosen trial."""
         best = replace(self.best, fit=fit)
@@ -85,7 +97,7 @@ def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -
 
     Sums of squares below `floor` are only rounding, and count as `floor`.
     """
-    least = max(floor, float(np.finfo(float).tiny))
+    least = max(floor, _TINY)
     criterion = schwarz(max(fit.objective, least), count, fit.structure.parameters)
     return Trial(intersample=mode, fit=fit, criterion=criterion)
 

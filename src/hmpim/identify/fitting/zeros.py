@@ -16,7 +16,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.candidates import best_of, pruned
-from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.fit import Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, scale_of, with_pole
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 
@@ -46,7 +46,7 @@ def mirrored(problem: Problem, fit: Fit, *, hopeless: float) -> list[Fit]:
         return found
     zeros = np.roots(fit.numerator[structure.dc_zeros :][::-1])
     for lead in -1.0 / zeros.real[(zeros.imag == 0.0) & (zeros.real != 0.0)]:
-        start = np.append(fit.theta[0] - 2.0 * lead, fit.theta[1:])
+        start = delayed(fit.theta, -2.0 * lead)
         other = fit_structure(problem, structure, start, hopeless=hopeless)
         if other.objective < hopeless and abs(other.delay - fit.delay) > abs(lead):
             found.append(other)
@@ -112,5 +112,5 @@ def second_zeros(problem: Problem, fit: Fit, hidden: HiddenPole) -> list[Fit]:
     theta = fit.theta
     if fit.structure.order == 2:
         theta = with_pole(fit.structure, fit.theta, hidden.lead)
-    starts = [np.append(theta[0] + later, theta[1:]) for later in (hidden.lead, -hidden.lead)]
+    starts = [delayed(theta, later) for later in (hidden.lead, -hidden.lead)]
     return [fit_structure(problem, STRUCTURES[SECOND_ZERO], start) for start in starts]

@@ -160,8 +160,8 @@ def _followed(
     """Explain each answer by one gain from the input in each group of neighbouring bins.
 
     Returned are the power of the input in each group, (g,), the explained and the total power of
-    each answer, both (k, g), and the number of bins in a group, all without what one gain from each
-    of the `others` explains. A band with too few bins has no groups.
+    each answer, both (k, g), and the number of independent bins in a group, all without what one
+    gain from each of the `others` explains. A band with too few bins has no groups.
     """
     count, n = answers.shape[0], samples
     first = max(int(np.ceil(band[0] * n)), 1)

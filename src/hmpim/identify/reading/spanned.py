@@ -67,9 +67,10 @@ def rivals_of(joint: JointFit) -> tuple[Trial, ...]:
 
 
 def plainer_rivals(joint: JointFit) -> tuple[Trial, ...]:
-    """Trials of other structures, with no more parameters, that the record does not exclude.
+    """Other trials with no more parameters that the record does not exclude.
 
-    Only the chosen assumption counts. Their price is no higher, so that the odds are Schwarz's.
+    They have other structures, or a zero in the other half plane. Only the chosen assumption
+    counts. Their price is no higher, so that the odds are Schwarz's.
     """
     best = joint.best
     if best.fit.structure.sampled:
@@ -94,7 +95,6 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
     """
     best = joint.best
     structure = best.fit.structure
-    count = joint.weighed.counted * joint.weighed_share
     hides_zero = joint.hidden is not None and joint.hidden.may_hide_zero
 
     def is_asked(trial: Trial) -> bool:
@@ -104,9 +104,8 @@ def asked_rivals(joint: JointFit) -> tuple[Trial, ...]:
         second = is_servo(structure) and other.name == SECOND_ZERO
         if extra <= 0 or trial.intersample != best.intersample or not (alike or second):
             return False
-        here, there = (max(each.fit.objective, _TINY) for each in (best, trial))
-        gain = count * (np.log(here) - np.log(there))
-        return bool(gain > scipy.special.chdtri(extra, 1.0 - COVERAGE) or (second and hides_zero))
+        by_chance = scipy.special.chdtri(extra, 1.0 - COVERAGE)
+        return bool(joint.gain(trial, best) > by_chance or (second and hides_zero))
 
     return tuple(filter(is_asked, joint.trials))
 
