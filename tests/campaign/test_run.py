@@ -358,7 +358,7 @@ def test_friction_is_modelled_unless_levels_are_compared(tmp_path, monkeypatch, 
 def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path, monkeypatch):
     """One answer to one question: the campaign's, and that of the record it has kept."""
     pytest.importorskip("mujoco")
-    identify = partial(hmpim.identify, structures=["static", "first_order", "second_order"])
+    identify = partial(hmpim.identify, structures=["third_order"])
     monkeypatch.setattr("hmpim.campaign.run.identify", identify)
     plan = table_plan(level=0.5, seconds=2.0)
     both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(250.0,), loads=("acceptance",))
