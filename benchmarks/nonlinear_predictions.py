@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,9 @@ SIZES = {
 }
 """Half gap, half width, force over stiffness, cubic share at a deflection of 1, speed."""
 
+WIDE = 0.09
+"""Seconds beyond which an edge is over, or has not begun, to the last digit."""
+
 PAGE = Path(__file__).parents[1] / "docs" / "nonlinearity.md"
 BEGIN, END = "<!-- predictions -->\n", "<!-- end of predictions -->"
 RANDOM, RANDOM_END = "<!-- random units -->\n", "<!-- end of random units -->"
@@ -45,6 +49,7 @@ def driven_by(source) -> Drive:
     return Drive(source=source, between="smooth", band=(0.1, 15.0), fs=FS, samples=SAMPLES)
 
 
+@cache
 def chirp(most: float = 1.0) -> Drive:
     """A chirp to 15 Hz."""
 
@@ -55,14 +60,23 @@ def chirp(most: float = 1.0) -> Drive:
     return driven_by(source)
 
 
+@cache
 def binary(seed: int, most: float = 0.7) -> Drive:
     """A binary sequence with smooth edges, which no sample misses."""
     rng = np.random.default_rng(seed)
     edges = np.cumsum(0.04 * rng.integers(1, 8, size=100))
     levels = most * np.diff(rng.choice([-1.0, 1.0], edges.size), prepend=0.0)
+    passed = np.concatenate([[0.0], np.cumsum(levels)])
 
     def source(t):
-        return ndtr((np.asarray(t)[:, None] - edges) / 0.01) @ levels
+        t = np.asarray(t)
+        first, last = (np.searchsorted(edges, t + reach) for reach in (-WIDE, WIDE))
+        x = passed[first]
+        for near in range(int((last - first).max(initial=0))):
+            k = np.minimum(first + near, edges.size - 1)
+            part = levels[k] * ndtr((t - edges[k]) / 0.01)
+            x = x + np.where(first + near < last, part, 0.0)
+        return x
 
     return driven_by(source)
 
@@ -83,9 +97,12 @@ def output_of(kind: str, size: float, unit: System, drive: Drive) -> np.ndarray:
     return through(unit, drive, fine)[::FINE]
 
 
+@cache
 def moved(kind: str, drive: Drive) -> np.ndarray:
-    """Output of the unit of the table."""
-    return output_of(kind, SIZES.get(kind, 0.0), UNIT, drive)
+    """Output of the unit of the table; it is kept, and must not be changed."""
+    y = output_of(kind, SIZES.get(kind, 0.0), UNIT, drive)
+    y.setflags(write=False)
+    return y
 
 
 def recorded(drive: Drive, y: np.ndarray, seed: int, noise: float = NOISE) -> hmpim.Record:

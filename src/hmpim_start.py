@@ -1,4 +1,4 @@
-"""What the command ``hmpim`` starts: it stands outside the package, whose import takes a second.
+"""What the command ``hmpim`` starts: it stands outside the package, whose import takes time.
 
 Until the command line is there to answer it, Ctrl-C ends the process with 130 and no traceback.
 """

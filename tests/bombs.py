@@ -1,4 +1,4 @@
-"""Small files of each packed format that unpack to gigabytes, made without unpacking them.
+"""Small files of each packed format that unpack to far more, made without unpacking them.
 
 A piece of zeros is packed once and stands in the file as often as it must.
 """
@@ -11,7 +11,7 @@ import zlib
 
 import numpy as np
 
-SIZE = 5 * 2**28
+SIZE = 5 * 2**27
 """Bytes that each unpacks to."""
 
 _PIECE = 2**26

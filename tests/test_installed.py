@@ -155,16 +155,28 @@ def test_no_module_needs_what_windows_has_not():
     assert int(done.stdout.split()[-1]) > 200
 
 
-def test_help_loads_no_room_of_scipy_and_no_drawing():
+def test_each_imports_what_it_uses_alone():
+    """The package nothing, help no room of SciPy and no drawing, identification neither."""
     program = (
-        "import hmpim, hmpim.cli.main, sys\n"
+        "import sys\n"
+        "import hmpim\nprint(*sys.modules)\n"
+        "import hmpim.cli.main\n"
         "try:\n    hmpim.cli.main.app(['--help'])\n"
-        "except SystemExit:\n    print(*sys.modules)\n"
+        "except SystemExit:\n    print()\n    print(*sys.modules)\n"
+        "hmpim.identify, hmpim.read, hmpim.run\nprint(*sys.modules)\n"
     )
     said = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=900
     )
-    slow = {"matplotlib", "pandas", "plotly", "scipy.optimize", "scipy.signal", "scipy.stats"}
-    loaded = set(said.stdout.splitlines()[-1].split())
-    assert "hmpim.cli.main" in loaded
-    assert not (slow | {"jinja2"}) & loaded
+    lines = said.stdout.splitlines()
+    alone, with_help, identifying = (set(lines[place].split()) for place in (0, -2, -1))
+    assert {name for name in alone if name.startswith("hmpim")} == {"hmpim"}
+    assert not {"numpy", "scipy"} & alone
+    slow = {
+        *("matplotlib", "jinja2", "pandas", "plotly", "scipy.ndimage", "scipy.optimize"),
+        *("scipy.signal", "scipy.special", "scipy.stats"),
+    }
+    assert "hmpim.cli.main" in with_help
+    assert not (slow | {"hmpim.identify", "hmpim.batch", "hmpim.report"}) & with_help
+    assert "hmpim.identify.identify" in identifying
+    assert not slow & identifying

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from numpy.typing import NDArray
-from scipy import special
+from scipy import signal, special
 
 import hmpim
 from hmpim import Estimate
@@ -224,6 +224,16 @@ def second_order_lag(
         v += h / 6 * (k1v + 2 * k2v + 2 * k3v + k4v)
         out[k + 1] = y
     return out[::steps]
+
+
+def answer_of(numerator, denominator, u, t) -> NDArray[np.float64]:
+    """Output of a linear system to samples joined by straight lines, from rest at 0.
+
+    As `scipy.signal.lsim` has it, which loops over the samples.
+    """
+    assert u[0] == 0.0
+    above, below, _ = signal.cont2discrete((numerator, denominator), t[1] - t[0], method="foh")
+    return signal.lfilter(above.ravel(), below, u)
 
 
 def field_chirp(time: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ import sys
 import time
 import tomllib
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -354,13 +355,15 @@ def test_friction_is_modelled_unless_levels_are_compared(tmp_path, monkeypatch, 
     assert len(asked) == len(levels)
 
 
-def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path):
+def test_all_axes_at_once_are_identified_as_their_record_is(tmp_path, monkeypatch):
     """One answer to one question: the campaign's, and that of the record it has kept."""
     pytest.importorskip("mujoco")
+    identify = partial(hmpim.identify, structures=["third_order"])
+    monkeypatch.setattr("hmpim.campaign.run.identify", identify)
     plan = table_plan(level=0.5, seconds=2.0)
     both = replace(plan.tests[0], axes=("roll", "yaw"), rates=(250.0,), loads=("acceptance",))
     (case,) = run_campaign(replace(plan, tests=(both,)), tmp_path)
-    found = hmpim.identify(hmpim.load(tmp_path / "records" / f"{case['id']}.h5"))
+    found = identify(hmpim.load(tmp_path / "records" / f"{case['id']}.h5"))
     assert [pair["axis"] for pair in case["pairs"]] == ["roll", "yaw"]
     for pair in case["pairs"]:
         again = found[pair["output"], pair["input"]].to_dict()

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy import signal
 
 import hmpim
 from hmpim.identify.fitting.joint import joint_fit
 from hmpim.model import STRUCTURES, coefficients_of, denominator_of, theta_of
-from tests_support import in_studies
+from tests_support import answer_of, in_studies
 
 FS, DURATION, FINE = 500.0, 6.0, 8
 OMEGA = 2 * np.pi
@@ -77,7 +76,7 @@ LONG = "integrator_first_order"  # to identify, as long as all the others
 def found(request):
     numerator, denominator, delay, *_ = CASES[request.param]
     fine = np.arange(int(FS * DURATION) * FINE) / (FS * FINE)
-    y = signal.lsim((numerator, denominator), chirp(fine - delay), fine)[1][::FINE]
+    y = answer_of(numerator, denominator, chirp(fine - delay), fine)[::FINE]
     noise = np.random.default_rng(0).standard_normal(y.size)
     record = hmpim.Record.from_arrays(
         {"u": chirp(fine[::FINE])},
@@ -130,8 +129,7 @@ def modes():
     fine = np.arange(int(FS * DURATION) * FINE) / (FS * FINE)
     y = np.zeros(fine.size // FINE)
     for gain, place, damping in zip(GAINS, PLACES, DAMPINGS, strict=True):
-        one = ([gain], mode(place, damping))
-        y += signal.lsim(one, chirp(fine - LATE), fine)[1][::FINE]
+        y += answer_of([gain], mode(place, damping), chirp(fine - LATE), fine)[::FINE]
     noise = np.random.default_rng(5).standard_normal(y.size)
     record = hmpim.Record.from_arrays(
         {"u": chirp(fine[::FINE])},
@@ -214,7 +212,7 @@ def test_a_resonance_is_found_in_nine_times_its_power_of_noise(seed):
     def sweep(time):
         return np.where(time > 0, np.sin(OMEGA * (time + 9.75 * time**2)), 0.0)
 
-    y = signal.lsim(([1.0], mode(12.5, 0.16)), sweep(fine - 0.015), fine)[1][::FINE]
+    y = answer_of([1.0], mode(12.5, 0.16), sweep(fine - 0.015), fine)[::FINE]
     noise = np.random.default_rng(seed).standard_normal(y.size)
     record = hmpim.Record.from_arrays(
         {"u": sweep(fine[::FINE])},

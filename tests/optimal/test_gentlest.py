@@ -179,10 +179,11 @@ def test_the_papers_family_comes_near_theory():
 
 @pytest.mark.usefixtures("effort")
 def test_the_same_wish_makes_the_same_samples():
-    one, other = search(), search()
+    one, other = search(duration=4.0), search(duration=4.0)
     np.testing.assert_array_equal(one.stimulus.position, other.stimulus.position)
 
 
+@pytest.mark.usefixtures("effort")
 @pytest.mark.parametrize("gentle", ["rms_acceleration", "travel"])
 def test_each_kind_of_gentleness_is_best_at_what_it_names(gentle_10s, gentle):
     other = search(gentle=gentle)

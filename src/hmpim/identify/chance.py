@@ -33,7 +33,7 @@ FALSE_ALARM = 1e-4
 COVERAGE = 0.95
 """Share of the intervals that contain the truth."""
 
-_NORMAL = NormalDist()  # scipy.special would be a third of the time of `import hmpim`
+_NORMAL = NormalDist()  # scipy.special takes 0.2 s to import
 
 
 def deviations(questions: int = 1) -> float:

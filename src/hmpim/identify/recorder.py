@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+import scipy
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, searched
@@ -91,7 +91,7 @@ def find_pulses(x: Real, valid: Mask, *, equal: bool = False) -> Mask | None:
     size, moves = x.size, np.diff(x)
     speeds = np.abs(moves)
     # Of the _AROUND steps that end with step k, at place k + _AROUND.
-    largest = maximum_filter1d(np.pad(speeds, _AROUND), _AROUND, origin=_AROUND // 2)
+    largest = scipy.ndimage.maximum_filter1d(np.pad(speeds, _AROUND), _AROUND, origin=_AROUND // 2)
     sharp = np.flatnonzero(speeds > TWICE * largest[_AROUND - 1 :][: speeds.size]) + 1
     if equal:
         first, last = runs_of(np.concatenate([[False], moves == 0.0]))

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 __all__ = ["process_context"]
 
-_KNOWN = ("hmpim", "hmpim.workbench.work.conducting", "hmpim.workbench.work.designed",
+_KNOWN = ("hmpim.workbench.work.conducting", "hmpim.workbench.work.designed",
           "hmpim.workbench.work.driving", "hmpim.workbench.work.runs")  # fmt: skip
 """What is imported once, where processes are copies of one that has imported it."""
 

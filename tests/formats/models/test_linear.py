@@ -2,6 +2,7 @@
 
 import runpy
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models import export
 from hmpim.formats.models.refined import pade_error
 from hmpim.model import Model, frequency_response
-from tests_support import run_octave
+from tests_support import in_studies, run_octave
 
 from .conftest import FS, result_of
 
@@ -46,9 +47,23 @@ def tolerance(model: Model) -> float:
     return 0.03 if model.quantization_step else 3e-4 * abs(model.scale_factor) * 1.5
 
 
-@pytest.mark.parametrize("tool", ["control", "scipy"])
-@pytest.mark.parametrize("name", sorted(MODELS))
-@pytest.mark.parametrize("intersample", ["bandlimited", "foh", "zoh"])
+TOOLS, BETWEEN = ("control", "scipy"), ("bandlimited", "foh", "zoh")
+SCRIPTS = [
+    (tool, name, BETWEEN[(i + k) % 3])
+    for i, tool in enumerate(TOOLS)
+    for k, name in enumerate(sorted(MODELS))
+]
+SCRIPTS += [one for one in product(TOOLS, ["second"], BETWEEN) if one not in SCRIPTS]
+"""Each tool with each model, and one model however the input moves between its samples."""
+
+
+@pytest.mark.parametrize(
+    ("tool", "name", "intersample"),
+    [
+        *SCRIPTS,
+        *in_studies(*(o for o in product(TOOLS, sorted(MODELS), BETWEEN) if o not in SCRIPTS)),
+    ],
+)
 def test_scripts_simulate_what_the_model_says(tool, name, intersample, tmp_path):
     if tool == "control":
         pytest.importorskip("control")

@@ -4,6 +4,7 @@ import json
 import re
 import runpy
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models import TARGETS, LinearPartOnly, export
 from hmpim.model import Model, NonlinearPart
 from hmpim.record import Finding
-from tests_support import run_octave
+from tests_support import in_studies, run_octave
 
 from .conftest import FS, compiled_c, result_of
 
@@ -68,9 +69,18 @@ def model_with(name: str, **changes: object) -> Model:
     return replace(unit, nonlinear=PARTS[name], **changes)
 
 
+def in_turn(names, others, both=()):
+    """Each name with one of the others, in turn, and some with all; all in `make studies`."""
+    names, others = sorted(names), sorted(others)
+    pairs = [(name, others[k % len(others)]) for k, name in enumerate(names)]
+    pairs += [(name, other) for name in both for other in others if (name, other) not in pairs]
+    return [*pairs, *in_studies(*(p for p in product(names, others) if p not in pairs))]
+
+
 @pytest.mark.usefixtures("needs_cc")
-@pytest.mark.parametrize("intersample", ["bandlimited", "zoh"])
-@pytest.mark.parametrize("name", sorted(PARTS))
+@pytest.mark.parametrize(
+    ("name", "intersample"), in_turn(PARTS, ["bandlimited", "zoh"], ["backlash", "friction_loop"])
+)
 def test_programs_step_what_the_model_steps(name, intersample, tmp_path, monkeypatch):
     # What a file says of its error is looked at below, and takes longer than the steps.
     monkeypatch.setattr("hmpim.formats.models.nonlinear._stepped_error", lambda source: 0.01)
@@ -91,8 +101,9 @@ def difference(found: np.ndarray, model: Model, u: np.ndarray) -> float:
     return float(np.std(found - truth) / np.std(truth - linear))
 
 
-@pytest.mark.parametrize("tool", ["control", "scipy"])
-@pytest.mark.parametrize("name", sorted(PARTS))
+@pytest.mark.parametrize(
+    ("name", "tool"), in_turn(PARTS, ["control", "scipy"], ["dead_zone", "friction_loop"])
+)
 def test_scripts_simulate_what_is_predicted(name, tool, tmp_path):
     if tool == "control":
         pytest.importorskip("control")
@@ -193,8 +204,10 @@ CARRIED = {
 }
 
 
-@pytest.mark.parametrize("name", ["backlash", "friction", "hardening", "curvature"])
-@pytest.mark.parametrize("target", sorted(TARGETS))
+@pytest.mark.parametrize(
+    ("target", "name"),
+    in_turn(TARGETS, ["backlash", "friction", "hardening", "curvature"], ["modelica", "mujoco"]),
+)
 def test_what_a_target_lacks_it_says_in_the_file_and_as_a_warning(
     target, name, tmp_path, monkeypatch
 ):

@@ -4,6 +4,7 @@ import runpy
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -60,13 +61,18 @@ MODELS = {
 }  # fmt: skip
 
 
+HELD = ("feedforward", "half open", "held", "integrator", "zero")
+"""Models whose programs are run with a held input as well."""
+PROGRAMS = [(name, "bandlimited") for name in sorted(MODELS)] + [(name, "zoh") for name in HELD]
+OTHERS = [p for p in product(sorted(MODELS), ("foh", "zoh", "bandlimited")) if p not in PROGRAMS]
+
+
 def walk(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(T.size).cumsum() / 5 + 1.0
 
 
 @pytest.mark.usefixtures("needs_cc")
-@pytest.mark.parametrize("intersample", ["zoh", "bandlimited", *in_studies("foh")])
-@pytest.mark.parametrize("name", sorted(MODELS))
+@pytest.mark.parametrize(("name", "intersample"), [*PROGRAMS, *in_studies(*OTHERS)])
 def test_programs_give_what_the_model_gives(name, intersample, tmp_path):
     model = replace(MODELS[name], intersample=intersample, band=20.0)
     result, u = result_of(model), walk(1)

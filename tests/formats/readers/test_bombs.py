@@ -1,4 +1,4 @@
-"""Small files that unpack to gigabytes: one sentence, and the stated memory is kept."""
+"""Small files that unpack to far more: one sentence, and the stated memory is kept."""
 
 import h5py
 import numpy as np
@@ -10,8 +10,8 @@ from hmpim.errors import FormatError
 from hmpim.formats.readers import Layout, reader_for
 from hmpim.formats.readers.worker import pool
 
-LIMIT = 1.0  # GiB; each bomb unpacks to a quarter more
-TOO_LARGE = r"needs more than the 1 GiB that reading a file may take.*HMPIM_READER_MEMORY"
+LIMIT = 0.5  # GiB; each bomb unpacks to a quarter more
+TOO_LARGE = r"needs more than the 0.5 GiB that reading a file may take.*HMPIM_READER_MEMORY"
 # What says by itself how much it holds is found to be damaged, not to be large.
 OTHERS = {"hdf5-chunk": "is damaged", "sqlite-view": "is damaged.*missing tables"}
 # Those that take seconds to unpack; the others go the same ways.

@@ -374,7 +374,8 @@ def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
             {"y": y[inside] + 0.02 * rng.standard_normal(600)},
             fs=100.0,
             intersample="bandlimited",
-        )
+        ),
+        structures=PLAIN,
     )
     assert found["y", "copy"].verdict == "not_identifiable"
     assert abs(found["y", "u"].delay.value - 0.05) < 0.002

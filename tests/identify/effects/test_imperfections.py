@@ -95,7 +95,8 @@ def test_noise_on_the_measured_input_is_said_with_what_it_costs(std, verdict):
     u = record.inputs[0].values
     measured = u + std * np.random.default_rng(3).standard_normal(u.size)
     pair = hmpim.identify(
-        hmpim.Record.from_arrays({"u": measured}, {"y": record.outputs[0].values}, fs=200.0)
+        hmpim.Record.from_arrays({"u": measured}, {"y": record.outputs[0].values}, fs=200.0),
+        structures=["second_order"],
     )["y", "u"]
     message = next(w.message for w in pair.warnings if w.code == "input_noise")
     assert float(message.split("noise of ")[1].split()[0]) == pytest.approx(std, rel=0.1)

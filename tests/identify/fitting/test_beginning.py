@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter, lsim
+from scipy.signal import lfilter
 
 import hmpim
 from hmpim.identify.fitting.beginning import begin_later, begins_of
@@ -10,7 +10,7 @@ from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.model.dynamics import STRUCTURES
 from hmpim.model.sampled import prepare_input
-from tests_support import fewest, four_sines
+from tests_support import answer_of, fewest, four_sines
 
 FS, FINE = 100.0, 16
 N = 60
@@ -21,7 +21,7 @@ def short(seed: int) -> hmpim.Record:
     t = np.arange(N * FINE) / (FS * FINE)
     u = np.sin(2 * np.pi * (1.67 * t + 25 * t**2))
     omega, damping = 2 * np.pi * 9.0, 0.25
-    _, y, _ = lsim(([1.0], [omega**-2, 2 * damping / omega, 1.0]), u, t)
+    y = answer_of([1.0], [omega**-2, 2 * damping / omega, 1.0], u, t)
     noise = 1e-3 * np.random.default_rng(seed).standard_normal(N)
     return hmpim.Record.from_arrays({"u": u[::FINE]}, {"y": y[::FINE] + noise}, fs=FS)
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from scipy import signal
 
 import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
 from hmpim.identify.fitting.tail import hidden_tail, with_tail
 from hmpim.model import STRUCTURES
 from hmpim.model.sampled import prepare_input
+from tests_support import answer_of
 
 FS, FINE = 200.0, 8
 T = np.arange(2000 * FINE) / (FS * FINE)
@@ -18,7 +18,7 @@ LAG = np.polymul([1 / (2 * np.pi * 6) ** 2, 2 * 0.6 / (2 * np.pi * 6), 1.0], [1.
 
 def record_of(tail, seed, noise=0.005, between=LAG):
     """Second order at 6 Hz, and a tail of 1.2 s."""
-    y = signal.lsim(([1.2 * (1.0 + tail), 1.0], between), CHIRP, T)[1][::FINE]
+    y = answer_of([1.2 * (1.0 + tail), 1.0], between, CHIRP, T)[::FINE]
     y = y + noise * np.random.default_rng(seed).standard_normal(y.size)
     return hmpim.Record.from_arrays(
         {"u": CHIRP[::FINE]}, {"y": y}, fs=FS, intersample="bandlimited"

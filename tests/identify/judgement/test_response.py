@@ -8,7 +8,7 @@ import scipy.signal
 
 from hmpim import Record, identify
 from hmpim.identify.judgement.response import bandwidth_disagrees
-from tests_support import field_chirp, second_order_lag
+from tests_support import answer_of, field_chirp, second_order_lag
 
 
 def test_a_clean_record_gives_no_finding(clean):
@@ -77,7 +77,7 @@ def test_the_response_to_a_ramp_or_a_step_is_that_of_the_unit(rise):
     u = np.interp(t - 0.2, [0.0, rise / fs], [0.0, 4.0])
     section = [1 / 57.0**2, 2 * 0.25 / 57.0, 1.0]
     moved = np.interp(t - 0.21, [0.0, rise / fs], [0.0, 4.0])
-    y = scipy.signal.lsim((1.0, section), moved, t)[1][::fine]
+    y = answer_of(1.0, section, moved, t)[::fine]
     y += 0.002 * np.random.default_rng(2).standard_normal(n)
     pair = identify(Record.from_arrays({"u": u[::fine]}, {"y": y}, fs=fs, intersample="foh"))[
         "y", "u"
@@ -101,7 +101,7 @@ def test_what_the_estimator_makes_of_four_lines_is_not_held_against_the_model():
         return sum(np.where(time > 0, np.sin(2 * np.pi * f * time), 0.0) for f in lines)
 
     section = [1 / 50.0**2, 2 * 0.4 / 50.0, 1.0]
-    y = scipy.signal.lsim((1.0, section), motion(t - 0.03), t)[1][::fine]
+    y = answer_of(1.0, section, motion(t - 0.03), t)[::fine]
     y += 0.01 * np.random.default_rng(5).standard_normal(n)
     record = Record.from_arrays(
         {"u": motion(t[::fine])}, {"y": y}, fs=fs, intersample="bandlimited"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.special
+import scipy
 
 from hmpim.identify.arrays import Real
 from hmpim.identify.chance import FALSE_ALARM
