@@ -13,10 +13,9 @@ from hmpim.identify.coupling.output_fit import (
     OutputFit,
     fit_leading,
     fit_together,
-    without_slow,
 )
-from hmpim.identify.effects.disturbance import criterion_gain, without_rows
-from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
+from hmpim.identify.effects.disturbance import without_rows
+from hmpim.identify.effects.drift import drift_rows, is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -35,7 +34,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Fits, follows
+from hmpim.identify.fitting.data import Counted, Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.tail import hidden_tail
@@ -229,37 +228,35 @@ def _leaves_tail(joint: JointFit) -> bool:
 
 
 def _plain_beside_drift(
-    question: Question, seen: Imperfections, led: Led, finish: Callable[[], OutputFit]
-) -> OutputFit | None:
-    """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
+    question: Question, seen: Imperfections, led: Led
+) -> OutputFit | Led | None:
+    """Plain dynamics of several inputs and a drift, if only these leave white noise.
 
-    `led` are plain fits of the strong inputs, with a constant bias; `finish` finishes these.
+    Otherwise the strong inputs' fits, each with the others known; None if one of them is slow.
+    `led` are those found so far: if the noise is white, a drift may have hidden more.
     """
-    known, (asked, first) = without_slow(led), next(iter(led.items()))
-    plain = OutputFit(fits=(first,))
-
-    def begun(rows: Real) -> tuple[Problem, Fit]:
-        nonlocal known
-        plainly = partial(fit_once, question, seen, question.plain, begun=known)
-        strong = plainly(rows, strong_only=True)
-        joint, known = strong.fits[strong.leading], strong.led
-        return joint.problem, joint.best.fit
+    plainly, asked = partial(fit_once, question, seen, question.plain), next(iter(led))
+    strong = plainly(drift_rows(question.output.values.size), begun=led, strong_only=True)
+    joint, known = strong.fits[strong.leading], strong.led
+    if not led.keys() <= known.keys():
+        return None
+    if not joint.best.fit.is_white:  # what else was found may only explain what is missing
+        return {j: known[j] for j in led}
+    steady = plainly(begun=known, strong_only=True)
+    first = steady.fits[asked]
+    if first.best.fit.is_white:
+        return steady.led
+    plain = strong
 
     def fitted(rows: Real) -> JointFit:
         nonlocal plain
-        plain = fit_once(question, seen, question.plain, rows, begun=known)
+        plain = plainly(rows, begun=known)
         return plain.fits[asked]
 
-    found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
+    begun = (joint.problem, joint.best.fit)
+    found = with_plain_drift(first.problem, first.best.fit, lambda _: begun, fitted)
     if found is None or not found[0].related or _leaves_tail(found[0]):
-        return None
-    steady = finish()
-    former = steady.fits[asked]
-    if former.best.fit.is_white and steady.slow is None:
-        return None
-    count = plain.fits[asked].best.fit.nuisance.size
-    if criterion_gain(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
-        return None
+        return steady.led
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=found[1], asked=asked)
 
@@ -302,7 +299,7 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
     return start(
         source.values,
         question.output.values,
-        counted_in(question, seen),
+        Counted(valid=counted_in(question, seen), begins=None),
         question.measured,
         question.intersample,
         question.structures,

@@ -8,7 +8,7 @@ from hmpim.identify.fitting.fit import FORGETS, Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
-__all__ = ["criterion_gain", "without_rows"]
+__all__ = ["criterion_gain", "held_rows", "without_rows"]
 
 
 def criterion_gain(joint: JointFit, count: int, former: Fit, without: Problem) -> float:
@@ -62,4 +62,27 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
         weighed=replace(joint.weighed, y=y),
         best=trials.get(id(joint.best)) or reduced(joint.best),
         trials=tuple(trials.values()),
+        rivals=tuple(map(reduced, joint.rivals)),
+    )
+
+
+def held_rows(joint: JointFit, kept: int) -> JointFit:
+    """Subtract what rows after the first `kept` explain from the output, and hold them there."""
+    found = without_rows(joint, slice(kept, None))
+
+    def fewer(problem: Problem) -> Problem:
+        rows = problem.nuisance
+        return replace(problem, nuisance=rows[:kept] if kept and rows is not None else None)
+
+    def reduced(trial: Trial) -> Trial:
+        return replace(trial, fit=replace(trial.fit, nuisance=trial.fit.nuisance[:kept]))
+
+    trials = {id(trial): reduced(trial) for trial in found.trials}
+    return replace(
+        found,
+        problem=fewer(found.problem),
+        weighed=fewer(found.weighed),
+        best=trials.get(id(found.best)) or reduced(found.best),
+        trials=tuple(trials.values()),
+        rivals=tuple(map(reduced, found.rivals)),
     )
