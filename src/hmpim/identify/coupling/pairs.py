@@ -257,7 +257,7 @@ def with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
     problem = replace(fit.problem, nuisance=nuisance)
     weights = np.zeros(0 if nuisance is None else len(nuisance))
     best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
-    return replace(fit, problem=problem, best=best, trials=(best,))
+    return replace(fit, problem=problem, best=best, trials=(best,), rivals=())
 
 
 def contribution(fit: JointFit) -> Real:

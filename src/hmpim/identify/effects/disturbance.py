@@ -62,20 +62,22 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
         weighed=replace(joint.weighed, y=y),
         best=trials.get(id(joint.best)) or reduced(joint.best),
         trials=tuple(trials.values()),
-        rivals=tuple(map(reduced, joint.rivals)),
     )
 
 
 def held_rows(joint: JointFit, kept: int) -> JointFit:
     """Subtract what rows after the first `kept` explain from the output, and hold them there."""
-    found = without_rows(joint, slice(kept, None))
+    found, rows = without_rows(joint, slice(kept, None)), joint.problem.fixed()[1 + kept :]
 
     def fewer(problem: Problem) -> Problem:
-        rows = problem.nuisance
-        return replace(problem, nuisance=rows[:kept] if kept and rows is not None else None)
+        own = problem.nuisance
+        return replace(problem, nuisance=own[:kept] if kept and own is not None else None)
 
     def reduced(trial: Trial) -> Trial:
-        return replace(trial, fit=replace(trial.fit, nuisance=trial.fit.nuisance[:kept]))
+        fit = trial.fit
+        if fit.prediction.size:  # of rivals, nothing is subtracted yet
+            fit = replace(fit, prediction=fit.prediction - fit.nuisance[kept:] @ rows)
+        return replace(trial, fit=replace(fit, nuisance=fit.nuisance[:kept]))
 
     trials = {id(trial): reduced(trial) for trial in found.trials}
     return replace(
