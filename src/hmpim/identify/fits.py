@@ -230,22 +230,21 @@ def _leaves_tail(joint: JointFit) -> bool:
 def _plain_beside_drift(
     question: Question, seen: Imperfections, led: Led
 ) -> OutputFit | Led | None:
-    """Plain dynamics of several inputs and a drift, if only these leave white noise.
+    """Plain dynamics of several inputs with a drift, if only these leave white noise.
 
-    Otherwise the strong inputs' fits, each with the others known; None if one of them is slow.
-    `led` are those found so far: if the noise is white, a drift may have hidden more.
+    Otherwise better fits of the strong inputs to go on from, if any. `led` are those found so far:
+    a constant bias may have hidden others, which are included if the noise is white with a drift.
     """
     plainly, asked = partial(fit_once, question, seen, question.plain), next(iter(led))
     strong = plainly(drift_rows(question.output.values.size), begun=led, strong_only=True)
     joint, known = strong.fits[strong.leading], strong.led
-    if not led.keys() <= known.keys():
+    if not (joint.best.fit.is_white and led.keys() <= known.keys()):
         return None
-    if not joint.best.fit.is_white:  # what else was found may only explain what is missing
-        return {j: known[j] for j in led}
-    steady = plainly(begun=known, strong_only=True)
+    steady = plainly(begun=known)
     first = steady.fits[asked]
+    found_without = steady.led if led.keys() <= steady.led.keys() else None
     if first.best.fit.is_white:
-        return steady.led
+        return found_without
     plain = strong
 
     def fitted(rows: Real) -> JointFit:
@@ -256,7 +255,7 @@ def _plain_beside_drift(
     begun = (joint.problem, joint.best.fit)
     found = with_plain_drift(first.problem, first.best.fit, lambda _: begun, fitted)
     if found is None or not found[0].related or _leaves_tail(found[0]):
-        return steady.led
+        return found_without
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=found[1], asked=asked)
 

@@ -4,8 +4,8 @@ The input that moves the output most is fitted as if alone. Others join as long 
 large part of the residual, each with its own assumption between the samples. Whether the record
 begins at rest is decided for all of them once all are known. The structure of each is chosen with
 the others free to move by their derivatives, and then all are moved at once; this is repeated for
-inputs for which the others have changed. Weak ones (`hmpim.identify.coupling.weak`) are fitted with
-the noise whitened.
+each input for which the others' contributions have changed. Weak ones
+(`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
 
 In the end all pairs are moved at once, and only then is each coupling tested, with the others free:
 of two inputs that are alike at some frequencies, the first may have explained a share of the
@@ -22,7 +22,7 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import covariances, derivatives
+from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
@@ -51,7 +51,7 @@ Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
 
 _TURNS = 3
-"""Most times that the structures of the strong inputs are chosen."""
+"""Most rounds in which the structures of the strong inputs are chosen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -117,7 +117,8 @@ class OutputFit:
 
 
 FitDrift = Callable[[Led], OutputFit | Led | None]
-"""From the strong inputs' fits: plain dynamics with a drift; or better fits of these without."""
+"""From the strong inputs' plain fits: the complete fit with a drift; or better fits without one, to
+go on from; or None, to go on from the given ones."""
 
 
 def _is_slow(fit: JointFit) -> bool:
@@ -149,8 +150,8 @@ def fit_together(
     The search starts from the fits `led` if given; they may have been made with other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
-    then fits plain dynamics with one, given the plain fits to the strong inputs without. If
-    `strong_only`, only strong inputs are fitted, with plain dynamics, and the others count as
+    is then asked for a complete fit of plain dynamics with a drift, or for better fits without one.
+    If `strong_only`, only strong inputs are fitted, with plain dynamics, and the others count as
     unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
@@ -164,6 +165,7 @@ def fit_together(
     pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
+        pairs.refine(pairs.kept, None)
     joined = len(pairs.strong)
     _join(inputs, pairs, plainly)
     found = None
@@ -244,9 +246,10 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
 def _fit_strong(
     inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit], *, only_new: bool = False
 ) -> bool:
-    """Fit each strong input, in place, with the others near where they are; return if any was.
+    """Fit each strong input, in place, with the others near where they are; whether any was fitted.
 
-    With `only_new`, only where the output without the others has changed since the last time.
+    With `only_new`, only those for which the others' contributions have changed since their last
+    search.
     """
     done = False
     for i in pairs.strong:
@@ -260,14 +263,18 @@ def _fit_strong(
 def _fit_beside(
     inputs: list[Real], pairs: Pairs, i: int, counted: Mask | None, fitted: Callable[..., JointFit]
 ) -> JointFit:
-    """Fit one input, the strong ones free to move by their derivatives, but held at the end.
+    """Fit one input while the other strong ones may move along their derivatives.
 
     So a structure is judged as if all inputs were fitted with it, except for terms of second order.
+    In the end that movement is subtracted.
     """
     own = pairs.fits[pairs.strong[0]].problem.nuisance
     slopes = pairs.slopes_of_others(i)
     rows = slopes if own is None else np.vstack([own, slopes])
-    options = {"begins": pairs.begins.get(i), "nuisance": rows if len(rows) else None}
+    begins = pairs.begins.get(i)
+    if begins is not None:
+        counted = common([counted, np.arange(pairs.y.size) >= begins])
+    options = {"begins": begins, "nuisance": rows if len(rows) else None}
     fit = fitted(inputs[i], pairs.without_others(i), valid=counted, **options)
     return held_rows(fit, len(rows) - len(slopes)) if len(slopes) else fit
 
@@ -298,7 +305,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
         likely = _likely(share)
         for j in likely:
             if j not in tried:
-                tried[j] = _fit_beside(inputs, pairs, j, counted, fitted)
+                tried[j] = fitted(inputs[j], pairs.without_others(j), valid=counted)
         i = min(likely, key=lambda j: tried[j].best.fit.cost)
         del share[i]
         own = pairs.fits.get(i)

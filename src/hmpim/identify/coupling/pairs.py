@@ -35,7 +35,7 @@ class Pairs:
     strong: list[int]  # inputs that are no weak couplings, the strongest first
     alike: Sequence[tuple[frozenset[int], Mask]]
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
-    # of the strong inputs, decided with all known: where the states are fitted from; None: at rest
+    # for strong inputs, once all are known: first sample from which the state is fitted
     begins: dict[int, int | None] = field(default_factory=dict)
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
@@ -102,13 +102,15 @@ class Pairs:
             self.begins.update({i: fit.problem.begins for i, fit in led.items()})
 
     def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
-        """Note the data of one input's full search; whether the last one had others.
+        """Whether an input's data differ from those of its last full search; if so, note them.
 
         A change with less power than one sample's noise moves no estimate by its error bar.
         """
         before = self._searched.get(i)
         if before is not None and count_alike(before[1], counted):
             change = rest - before[0]
+            change = change if counted is None else change[counted]
+            change = change - change.mean()  # the bias makes up for a constant
             if float(change @ change) <= self.cost:
                 return False
         self._searched[i] = rest, counted
@@ -126,6 +128,7 @@ class Pairs:
                 free = replace(self.fits[j].problem, valid=None, nuisance=None)
                 rows += slopes_of(free, self.fits[j])
         found = np.vstack(rows)
+        found = found - found.mean(axis=1, keepdims=True)  # a constant is the bias's
         sizes = np.linalg.norm(found, axis=1)
         return np.asarray(found[sizes > 0] / sizes[sizes > 0, None])
 
@@ -164,10 +167,10 @@ class Pairs:
         Each input was fitted before the others were known, whose motion hides its free response.
         """
         found, size = [self.fits[i] for i in self.strong], self.y.size
-        modes = sum(one.best.fit.structure.order for one in found)
-        rests = any(one.problem.begins is None for one in found)
+        resting = [one for one in found if one.problem.begins is None]
+        modes = sum(one.best.fit.structure.order for one in resting)
         sampled = any(one.best.fit.structure.sampled for one in found)
-        if not modes or not rests or sampled or is_white(self.residual()):
+        if not modes or sampled or is_white(self.residual()):
             return
         latest = max(one.best.fit.delay for one in found)
         given = Counted(valid=self.counted(self.kept), begins=None)
@@ -175,19 +178,20 @@ class Pairs:
         if later is None:
             return
         fits, masks, before = dict(self.fits), dict(self.masks), self.residual()
-        for i in self.strong:
+        moving = [i for i in self.strong if self.fits[i].best.fit.structure.order]
+        for i in moving:
             self.put(i, begun(self.fits[i], inputs[i], later))
         self.refine(self.kept, None)
         if _explains(modes, before, self.residual(), later.valid):
-            self.begins.update(dict.fromkeys(self.strong, later.first))
+            self.begins.update(dict.fromkeys(moving, later.first))
         else:
             self.fits.update(fits)
             self.masks.update(masks)
 
     def rest_states(self, inputs: Sequence[Real]) -> None:
-        """Assume rest before the record for inputs, (n,), whose free responses it does not show.
+        """Return inputs, (n,), to rest before the record whose free responses are within chance.
 
-        Only where the residual is white: otherwise what is missing may hide them.
+        Only where the residual is white: otherwise motion that no fit explains may hide them.
         """
         if not is_white(self.residual()):
             return
@@ -230,7 +234,7 @@ class Pairs:
 
 
 def begun(fit: JointFit, u: Real, seen: Counted) -> JointFit:
-    """A fit with another beginning of its input, (n,)."""
+    """The same fit, not yet refined, from another beginning of its input, (n,)."""
     wanted = min(PRECISION, precision_for(fit.problem, fit.best.fit))
     source = prepared(u, fit.best.intersample, rest=seen.begins is None, precision=wanted)
     problem = replace(fit.problem, source=source, valid=seen.valid, begins=seen.first)

@@ -66,7 +66,7 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
 
 
 def held_rows(joint: JointFit, kept: int) -> JointFit:
-    """Subtract what rows after the first `kept` explain from the output, and hold them there."""
+    """Subtract from the output what rows after the first `kept` explain, and drop these rows."""
     found, rows = without_rows(joint, slice(kept, None)), joint.problem.fixed()[1 + kept :]
 
     def fewer(problem: Problem) -> Problem:

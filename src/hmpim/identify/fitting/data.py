@@ -155,7 +155,7 @@ def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
 
 
 def precision_for(problem: Problem, fit: Fit) -> float:
-    """Share of the input that its interpolation may miss, so that noise has the larger effect.
+    """Interpolation error, as a share of the input, that stays well below the effect of noise.
 
     The interpolation error biases an estimate by its share of the output; the noise scatters it
     by its own share over the root of the number of samples. The noise is taken from a median,

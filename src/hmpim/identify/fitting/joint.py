@@ -88,6 +88,9 @@ def joint_fit(
     shared : bool
         Whether other inputs, whose fits are unfinished, move the output too: many poles need not
         leave white noise then.
+    begins : int, optional
+        First sample from which the free response of an unknown initial state is fitted; if None,
+        the record decides.
 
     Returns
     -------
