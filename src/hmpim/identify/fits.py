@@ -13,9 +13,10 @@ from hmpim.identify.coupling.output_fit import (
     OutputFit,
     fit_leading,
     fit_together,
+    without_slow,
 )
-from hmpim.identify.effects.disturbance import without_rows
-from hmpim.identify.effects.drift import drift_rows, is_slow, with_drift, with_plain_drift
+from hmpim.identify.effects.disturbance import criterion_gain, without_rows
+from hmpim.identify.effects.drift import is_slow, with_drift, with_plain_drift
 from hmpim.identify.effects.hum import Humming, line_near, with_hum
 from hmpim.identify.effects.imperfections import (
     Imperfections,
@@ -34,7 +35,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Counted, Fits, follows
+from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
 from hmpim.identify.fitting.tail import hidden_tail
@@ -228,34 +229,37 @@ def _leaves_tail(joint: JointFit) -> bool:
 
 
 def _plain_beside_drift(
-    question: Question, seen: Imperfections, led: Led
-) -> OutputFit | Led | None:
-    """Plain dynamics of several inputs with a drift, if only these leave white noise.
+    question: Question, seen: Imperfections, led: Led, finish: Callable[[], OutputFit]
+) -> OutputFit | None:
+    """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    Otherwise better fits of the strong inputs to go on from, if any. `led` are those found so far:
-    a constant bias may have hidden others, which are included if the noise is white with a drift.
+    `led` are plain fits of the strong inputs, with a constant bias; `finish` finishes these.
     """
-    plainly, asked = partial(fit_once, question, seen, question.plain), next(iter(led))
-    strong = plainly(drift_rows(question.output.values.size), begun=led, strong_only=True)
-    joint, known = strong.fits[strong.leading], strong.led
-    if not (joint.best.fit.is_white and led.keys() <= known.keys()):
-        return None
-    steady = plainly(begun=known)
-    first = steady.fits[asked]
-    found_without = steady.led if led.keys() <= steady.led.keys() else None
-    if first.best.fit.is_white:
-        return found_without
-    plain = strong
+    known, (asked, first) = without_slow(led), next(iter(led.items()))
+    plain = OutputFit(fits=(first,))
+
+    def begun(rows: Real) -> tuple[Problem, Fit]:
+        nonlocal known
+        plainly = partial(fit_once, question, seen, question.plain, begun=known)
+        strong = plainly(rows, strong_only=True)
+        joint, known = strong.fits[strong.leading], strong.led
+        return joint.problem, joint.best.fit
 
     def fitted(rows: Real) -> JointFit:
         nonlocal plain
-        plain = plainly(rows, begun=known)
+        plain = fit_once(question, seen, question.plain, rows, begun=known)
         return plain.fits[asked]
 
-    begun = (joint.problem, joint.best.fit)
-    found = with_plain_drift(first.problem, first.best.fit, lambda _: begun, fitted)
+    found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
     if found is None or not found[0].related or _leaves_tail(found[0]):
-        return found_without
+        return None
+    steady = finish()
+    former = steady.fits[asked]
+    if former.best.fit.is_white and steady.slow is None:
+        return None
+    count = plain.fits[asked].best.fit.nuisance.size
+    if criterion_gain(plain.fits[asked], count, former.best.fit, former.problem) < 0.0:
+        return None
     fits = tuple(without_rows(one, slice(None)) for one in plain.fits)
     return replace(plain, fits=fits, drifting=found[1], asked=asked)
 
@@ -298,7 +302,7 @@ def started(question: Question, seen: Imperfections, rows: Real | None = None) -
     return start(
         source.values,
         question.output.values,
-        Counted(valid=counted_in(question, seen), begins=None),
+        counted_in(question, seen),
         question.measured,
         question.intersample,
         question.structures,

@@ -361,6 +361,19 @@ def test_the_weaker_input_is_fitted_again_once_the_leading_one_has_joined():
         assert abs(pair.delay.value - delay) < 1e-3
 
 
+def test_a_full_search_is_not_repeated_for_a_change_below_the_noise():
+    rng = np.random.default_rng(5)
+    u, noise = rng.standard_normal(500), 0.1 * rng.standard_normal(500)
+    fit = joint_fit(u, u + noise, intersample="zoh", structures=("static",), growing=False)
+    pairs = Pairs(y=u + noise, valid=None, fits={}, strong=[0], alike=())
+    pairs.put(0, fit)
+    rest, one_sample = pairs.without_others(0), np.zeros(500)
+    one_sample[300] = np.sqrt(pairs.cost)
+    assert pairs.is_new(0, rest, None)
+    assert not pairs.is_new(0, rest + 0.9 * one_sample + 7.0, None)
+    assert pairs.is_new(0, rest + 1.1 * one_sample, None)
+
+
 @pytest.mark.parametrize("seed", [1, *in_studies(0)])
 def test_a_noisy_copy_does_not_lead_where_the_record_begins_in_motion(seed):
     rng = np.random.default_rng(seed)

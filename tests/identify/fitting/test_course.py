@@ -13,12 +13,10 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Counted
 from hmpim.identify.fitting.enrich import INTEGRATING, PLAIN
 from hmpim.identify.fitting.fit import fit_structure
 from hmpim.model.dynamics import STRUCTURES
 
-ALL = Counted(valid=None, begins=None)
 SWEEP = np.sin(2 * np.pi * (0.001 + 0.004 * np.arange(10_000) / 10_000) * np.arange(10_000))
 
 
@@ -47,7 +45,7 @@ def test_what_is_left_of_the_way_down_is_no_free_response(steps):
     )
     y = np.asarray(hmpim.simulate(unit, u, fs=200.0, intersample="bandlimited"))
     y = y + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
-    course = start(u, y, ALL, None, "bandlimited", ("second_order",), None)
+    course = start(u, y, None, None, "bandlimited", ("second_order",), None)
     near, structure = np.array([30.6, 1.0, 1.5]), STRUCTURES["second_order"]
     fit = fit_structure(course.problem, structure, near, iterations=steps)
     assert not fit.converged
@@ -60,7 +58,7 @@ def test_what_an_integrator_does_is_neither_ahead_of_its_input_nor_wander(first,
     sweep = np.sin(2 * np.pi * np.cumsum(frequency)) * np.sqrt(first / frequency)
     late = np.append(np.zeros(20), np.cumsum(sweep)[:-20]) / 200
     y = late + 0.002 * np.random.default_rng(1).standard_normal(samples)
-    course = start(sweep, y, ALL, None, None, (*PLAIN, *INTEGRATING), None)
+    course = start(sweep, y, None, None, None, (*PLAIN, *INTEGRATING), None)
     assert course.data.rough.ahead is not None  # it looks like it
     assert turn_ahead(course) is course
     assert free_from_wander(course) is course

@@ -12,7 +12,7 @@ from hmpim.identify.fitting.least_squares import UNSEEN, without
 from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
 
-__all__ = ["common", "covariances", "derivatives", "gained_by", "slopes_of"]
+__all__ = ["common", "covariances", "derivatives", "gained_by"]
 
 
 def common(masks: Iterable[Mask | None]) -> Mask | None:
@@ -35,9 +35,11 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
     )
     blocks, others, bias = [], [], problem.masked(np.ones((1, problem.y.size)))
     for fit in fits:
-        block, free = slopes_of(problem, fit)
-        blocks.append(block)
-        others.append(free)
+        own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
+        part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
+        alone = replace(own, begins=None, nuisance=None)
+        blocks.append(jacobian(alone, fit.best.fit, part=part)[:-1])
+        others.append(part.free)
     if problem.nuisance is not None:
         others.append(problem.nuisance)
     given = problem.masked(np.vstack(others))
@@ -45,17 +47,6 @@ def derivatives(fits: list[JointFit], whitening: Real | None) -> tuple[Problem, 
         edges = np.cumsum([block.shape[0] for block in blocks])
         *blocks, bias = np.split(without(np.vstack([*blocks, bias]), given), edges)
     return problem, blocks, bias
-
-
-def slopes_of(problem: Problem, fit: JointFit) -> tuple[Real, Real]:
-    """Derivatives by one pair's parameters without the bias, where all count; and free responses.
-
-    `problem` has the samples that count and the whitening.
-    """
-    own = replace(problem, source=fit.problem.source, begins=fit.problem.begins)
-    part = part_of(own, fit.best.fit.structure, fit.best.fit.theta)
-    alone = replace(own, begins=None, nuisance=None)
-    return jacobian(alone, fit.best.fit, part=part)[:-1], part.free
 
 
 def covariances(problem: Problem, last: JointFit, blocks: list[Real], bias: Real) -> list[Real]:

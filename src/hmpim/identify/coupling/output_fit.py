@@ -1,16 +1,14 @@
-"""One output, several inputs at once: each pair's structure, and all parameters together.
+"""One output, several inputs at once: each pair's fit, with the others' contributions subtracted.
 
 The input that moves the output most is fitted as if alone. Others join as long as one explains a
-large part of the residual, each with its own assumption between the samples. Whether the record
-begins at rest is decided for all of them once all are known. The structure of each is chosen with
-the others free to move by their derivatives, and then all are moved at once; this is repeated for
-each input for which the others' contributions have changed. Weak ones
-(`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
+large part of the residual, each with its own beginning and assumption between the samples. They are
+fitted in turns, each to the output without the others, until moving all at once gains little. Weak
+ones (`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
 
-In the end all pairs are moved at once, and only then is each coupling tested, with the others free:
-of two inputs that are alike at some frequencies, the first may have explained a share of the
-other's coupling. The error bars come from all pairs' derivatives together, so inputs that resemble
-each other widen them.
+Then all pairs are moved at once, and only then is each coupling tested, with the others free: of
+two inputs that are alike at some frequencies, the first may have explained a share of the other's
+coupling. The error bars come from all pairs' derivatives together, so inputs that resemble each
+other widen them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +20,10 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
-from hmpim.identify.coupling.joint_errors import common, covariances, derivatives
+from hmpim.identify.coupling.joint_errors import covariances, derivatives
 from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
-from hmpim.identify.effects.disturbance import held_rows
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -36,7 +33,6 @@ from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Problem
 from hmpim.identify.fitting.joint import fit_likeliest, joint_fit
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.whiteness import is_white
 from hmpim.identify.nonlinear.modelled import Modelled
 from hmpim.identify.section_iv.correlation import likeness
 from hmpim.identify.section_iv.spectrum import excited_band
@@ -45,13 +41,13 @@ from hmpim.model.dynamics import StructureName
 from hmpim.model.sampled import prepare_input
 from hmpim.record import Intersample, is_held
 
-__all__ = ["FitDrift", "Led", "OutputFit", "fit_leading", "fit_together"]
+__all__ = ["FitDrift", "Led", "OutputFit", "fit_leading", "fit_together", "without_slow"]
 
 Led = Mapping[int, JointFit]
 """Fits to inputs that move an output strongly, the strongest first."""
 
 _TURNS = 3
-"""Most rounds in which the structures of the strong inputs are chosen."""
+"""Times that the strong inputs are fitted, each with the others known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +90,7 @@ class OutputFit:
         """Fits to the strong inputs, the strongest first, except those that may explain a drift."""
         known = [j for j, fit in enumerate(self.fits) if fit.related and self.strong[j]]
         known.sort(key=lambda j: -float(np.std(contribution(self.fits[j]))))
-        return {j: self.fits[j] for j in known if not _is_slow(self.fits[j])}
+        return without_slow({j: self.fits[j] for j in known})
 
     @property
     def leading(self) -> int:
@@ -116,9 +112,13 @@ class OutputFit:
         return np.sum(trends, axis=0) if trends else None
 
 
-FitDrift = Callable[[Led], OutputFit | Led | None]
-"""From the strong inputs' plain fits: the complete fit with a drift; or better fits without one, to
-go on from; or None, to go on from the given ones."""
+FitDrift = Callable[[Led, Callable[[], OutputFit]], OutputFit | None]
+"""Fit plain dynamics with a drift, from the strong inputs' fits and what finishes these without."""
+
+
+def without_slow(led: Led) -> Led:
+    """The fits that are not as slow as a drift."""
+    return {j: fit for j, fit in led.items() if not _is_slow(fit)}
 
 
 def _is_slow(fit: JointFit) -> bool:
@@ -150,9 +150,9 @@ def fit_together(
     The search starts from the fits `led` if given; they may have been made with other rows.
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
-    is then asked for a complete fit of plain dynamics with a drift, or for better fits without one.
-    If `strong_only`, only strong inputs are fitted, with plain dynamics, and the others count as
-    unrelated.
+    then fits plain dynamics with one, given the plain fits to the strong inputs and a function that
+    finishes plain dynamics without; its value is returned unless it is None. If `strong_only`, only
+    strong inputs are fitted, with plain dynamics, and the others count as unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -165,29 +165,30 @@ def fit_together(
     pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
-        pairs.refine(pairs.kept, None)
     joined = len(pairs.strong)
     _join(inputs, pairs, plainly)
-    found = None
-    if fit_drift is not None and not is_white(pairs.residual()):
-        found = fit_drift({j: pairs.fits[j] for j in pairs.strong})
-    if isinstance(found, OutputFit):
-        return found
-    if found is not None:
-        pairs = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
-        pairs.resume(found, nuisance)
-        pairs.free_states(inputs)
-    elif len(pairs.strong) > joined and not is_white(pairs.residual()):
-        _fit_strong(inputs, pairs, plainly)  # the first were fitted next to what others explain
-        pairs.refine(pairs.kept, None)
-    pairs.rest_states(inputs)
     if strong_only:
+        if len(pairs.strong) > joined:  # the others were fitted next to what these explain
+            _fit_strong(inputs, pairs, plainly)
         pairs.refine(pairs.kept, None)
         none = replace(pairs.fits[pairs.strong[0]], related=False)
         return OutputFit(
             fits=tuple(pairs.fits.get(j, none) for j in range(len(inputs))),
             strong=tuple(j in pairs.strong for j in range(len(inputs))),
         )
+    if fit_drift is not None and whitening_of(pairs.residual()) is not None:
+        found = {j: pairs.fits[j] for j in pairs.strong}
+
+        def steady() -> OutputFit:
+            again = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
+            again.resume(found, nuisance)
+            if len(found) > 1:  # which samples count is decided anew
+                _join(inputs, again, plainly)
+            return _finished(inputs, again, fitted, plainly, plain)
+
+        drifting = fit_drift(found, steady)
+        if drifting is not None:
+            return drifting
     return _finished(inputs, pairs, fitted, plainly, structures)
 
 
@@ -198,17 +199,16 @@ def _finished(
     plainly: Callable[..., JointFit],
     structures: tuple[StructureName, ...],
 ) -> OutputFit:
-    """Choose the structures, fit the couplings and move all at once until nothing changes."""
+    """Fit the strong inputs and the couplings until moving all at once gains little."""
     richly = partial(fitted, structures=structures, shared=True)
     least = pairs.cost
     _fit_couplings(inputs, pairs, structures)
     for _ in range(_TURNS):
-        before, reached, white = pairs.structures, pairs.cost, is_white(pairs.residual())
+        before, reached, rest = pairs.structures, pairs.cost, pairs.residual()
         fits, masks = {**pairs.fits}, {**pairs.masks}
-        if not _fit_strong(inputs, pairs, richly, only_new=True):
-            break
+        _fit_strong(inputs, pairs, richly)
         pairs.refine(pairs.kept, None)
-        if white and pairs.cost > TWICE * reached:  # it ended elsewhere
+        if pairs.cost > TWICE * reached and whitening_of(rest) is None:  # it ended elsewhere
             pairs.fits.update(fits)
             pairs.masks.update(masks)
             break
@@ -216,10 +216,10 @@ def _finished(
         if clearer:
             _join(inputs, pairs, plainly)
             least = pairs.cost
-        if clearer or pairs.structures != before:
-            _fit_couplings(inputs, pairs, structures)
-            pairs.refine(pairs.kept, None)
-    pairs.rest_states(inputs)
+        if pairs.structures == before and not clearer:
+            break  # otherwise each was fitted with wrong contributions of the others
+        _fit_couplings(inputs, pairs, structures)
+        pairs.refine(pairs.kept, None)
     return _moved_at_once(pairs)
 
 
@@ -243,40 +243,12 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
     )
 
 
-def _fit_strong(
-    inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit], *, only_new: bool = False
-) -> bool:
-    """Fit each strong input, in place, with the others near where they are; whether any was fitted.
-
-    With `only_new`, only those for which the others' contributions have changed since their last
-    search.
-    """
-    done = False
+def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
+    """Fit each strong input, in place, to the output without the others, if that has changed."""
     for i in pairs.strong:
-        counted = pairs.counted(j for j in pairs.kept if j != i)
-        if not only_new or pairs.is_new(i, pairs.without_others(i), counted):
-            pairs.put(i, _fit_beside(inputs, pairs, i, counted, fitted))
-            done = True
-    return done
-
-
-def _fit_beside(
-    inputs: list[Real], pairs: Pairs, i: int, counted: Mask | None, fitted: Callable[..., JointFit]
-) -> JointFit:
-    """Fit one input while the other strong ones may move along their derivatives.
-
-    So a structure is judged as if all inputs were fitted with it, except for terms of second order.
-    In the end that movement is subtracted.
-    """
-    own = pairs.fits[pairs.strong[0]].problem.nuisance
-    slopes = pairs.slopes_of_others(i)
-    rows = slopes if own is None else np.vstack([own, slopes])
-    begins = pairs.begins.get(i)
-    if begins is not None:
-        counted = common([counted, np.arange(pairs.y.size) >= begins])
-    options = {"begins": begins, "nuisance": rows if len(rows) else None}
-    fit = fitted(inputs[i], pairs.without_others(i), valid=counted, **options)
-    return held_rows(fit, len(rows) - len(slopes)) if len(slopes) else fit
+        rest, counted = pairs.without_others(i), pairs.counted(j for j in pairs.kept if j != i)
+        if pairs.is_new(i, rest, counted):
+            pairs.put(i, fitted(inputs[i], rest, valid=counted))
 
 
 def fit_leading(
@@ -316,7 +288,6 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
             tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
-    pairs.free_states(inputs)
 
 
 def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:

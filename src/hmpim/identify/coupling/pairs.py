@@ -7,19 +7,16 @@ import numpy as np
 
 from hmpim.identify.arrays import Mask, Real, count_alike
 from hmpim.identify.chance import SEARCHED
-from hmpim.identify.coupling.joint_errors import common, gained_by, slopes_of
-from hmpim.identify.fitting.beginning import REACH, begin_at, needs_free
-from hmpim.identify.fitting.data import Counted, precision_for, prepared
+from hmpim.identify.coupling.joint_errors import common, gained_by
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.whiteness import effective_share, is_white
+from hmpim.identify.noise.whiteness import effective_share
 from hmpim.identify.worth import PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
-from hmpim.model.sampled import PRECISION
 
-__all__ = ["Pairs", "begun", "constant_of", "contribution", "with_nuisance"]
+__all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,8 +32,6 @@ class Pairs:
     strong: list[int]  # inputs that are no weak couplings, the strongest first
     alike: Sequence[tuple[frozenset[int], Mask]]
     masks: dict[int, Mask | None] = field(default_factory=dict)  # samples that each fit counts
-    # for strong inputs, once all are known: first sample from which the state is fitted
-    begins: dict[int, int | None] = field(default_factory=dict)
     _searched: dict[int, tuple[Real, Mask | None]] = field(default_factory=dict)
 
     @property
@@ -96,10 +91,7 @@ class Pairs:
             self.strong.append(i)
         if len(led) > 1 or others:
             self.refine(self.kept, None)
-        if others:
             self.masks.update(dict.fromkeys(led))
-        elif len(led) > 1:
-            self.begins.update({i: fit.problem.begins for i, fit in led.items()})
 
     def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
         """Whether an input's data differ from those of its last full search; if so, note them.
@@ -119,18 +111,6 @@ class Pairs:
     def counted(self, some: Iterable[int]) -> Mask | None:
         """Samples at which the contributions of some inputs are known."""
         return common([self.valid, *(self.masks[j] for j in some)])
-
-    def slopes_of_others(self, i: int) -> Real:
-        """Derivatives of the output by the parameters of all strong inputs but one, (k, n)."""
-        rows = [np.zeros((0, self.y.size))]
-        for j in self.strong:
-            if j != i and self.fits[j].related:
-                free = replace(self.fits[j].problem, valid=None, nuisance=None)
-                rows += slopes_of(free, self.fits[j])
-        found = np.vstack(rows)
-        found = found - found.mean(axis=1, keepdims=True)  # a constant is the bias's
-        sizes = np.linalg.norm(found, axis=1)
-        return np.asarray(found[sizes > 0] / sizes[sizes > 0, None])
 
     def residual(self) -> Real:
         """The output without any contribution or constant; 0 where not known."""
@@ -161,53 +141,6 @@ class Pairs:
             self.fits[j] = replace(moved_fit, problem=own, weighed=own, effective_share=share)
         return problems, found
 
-    def free_states(self, inputs: Sequence[Real]) -> None:
-        """Fit the initial states of all strong inputs, (n,), if the residual requires them.
-
-        Each input was fitted before the others were known, whose motion hides its free response.
-        """
-        found, size = [self.fits[i] for i in self.strong], self.y.size
-        resting = [one for one in found if one.problem.begins is None]
-        modes = sum(one.best.fit.structure.order for one in resting)
-        sampled = any(one.best.fit.structure.sampled for one in found)
-        if not modes or sampled or is_white(self.residual()):
-            return
-        latest = max(one.best.fit.delay for one in found)
-        given = Counted(valid=self.counted(self.kept), begins=None)
-        later = begin_at(given, int(np.ceil(max(latest, 0.0))) + REACH, size)
-        if later is None:
-            return
-        fits, masks, before = dict(self.fits), dict(self.masks), self.residual()
-        moving = [i for i in self.strong if self.fits[i].best.fit.structure.order]
-        for i in moving:
-            self.put(i, begun(self.fits[i], inputs[i], later))
-        self.refine(self.kept, None)
-        if _explains(modes, before, self.residual(), later.valid):
-            self.begins.update(dict.fromkeys(moving, later.first))
-        else:
-            self.fits.update(fits)
-            self.masks.update(masks)
-
-    def rest_states(self, inputs: Sequence[Real]) -> None:
-        """Return inputs, (n,), to rest before the record whose free responses are within chance.
-
-        Only where the residual is white: otherwise motion that no fit explains may hide them.
-        """
-        if not is_white(self.residual()):
-            return
-        for i in reversed(self.strong):
-            one, modes = self.fits[i], self.fits[i].best.fit.structure.order
-            if one.problem.begins is None or not modes:
-                continue
-            fits, after = dict(self.fits), self.residual()
-            resting = Counted(valid=one.problem.valid, begins=None)
-            self.fits[i] = begun(one, inputs[i], resting)
-            self.refine(self.kept, None)
-            if _explains(modes, self.residual(), after, self.counted(self.kept)):
-                self.fits.update(fits)
-            else:
-                self.begins[i] = None
-
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
         """Move all couplings at once; drop the weakest if it adds nothing; return if dropped."""
         dominant = self.dominant
@@ -233,21 +166,6 @@ class Pairs:
         return True
 
 
-def begun(fit: JointFit, u: Real, seen: Counted) -> JointFit:
-    """The same fit, not yet refined, from another beginning of its input, (n,)."""
-    wanted = min(PRECISION, precision_for(fit.problem, fit.best.fit))
-    source = prepared(u, fit.best.intersample, rest=seen.begins is None, precision=wanted)
-    problem = replace(fit.problem, source=source, valid=seen.valid, begins=seen.first)
-    return replace(fit, problem=problem, weighed=problem, forgotten=seen.first or 0)
-
-
-def _explains(modes: int, before: Real, after: Real, counts: Mask | None) -> bool:
-    """Whether free responses of so many modes lower a residual, (n,), by more than chance."""
-    power, left = (rest if counts is None else rest[counts] for rest in (before, after))
-    count = effective_share(left) * left.size
-    return bool(needs_free(float(power @ power), float(left @ left), count, modes))
-
-
 def _has_nuisance(fit: JointFit, nuisance: Real | None) -> bool:
     """Whether these rows, (k, n), are those of a fit."""
     own = fit.problem.nuisance
@@ -261,7 +179,7 @@ def with_nuisance(fit: JointFit, nuisance: Real | None) -> JointFit:
     problem = replace(fit.problem, nuisance=nuisance)
     weights = np.zeros(0 if nuisance is None else len(nuisance))
     best = replace(fit.best, fit=replace(fit.best.fit, nuisance=weights))
-    return replace(fit, problem=problem, best=best, trials=(best,), rivals=())
+    return replace(fit, problem=problem, best=best, trials=(best,))
 
 
 def contribution(fit: JointFit) -> Real:

@@ -61,9 +61,8 @@ def count_in(
     fit = min(fits, key=lambda f: f.objective)
     # With a negative delay the last samples depend on input after the record.
     ahead = int(np.ceil(-fit.delay)) + 3 if fit.delay < 0 else 0
-    found = begins_of(data.problem(mode, seen), fit, lag=data.rough.lag)
-    begins = seen.begins if found is None else found
-    if found is None and not ahead and known is None:
+    begins = begins_of(data.problem(mode, seen), fit, lag=data.rough.lag)
+    if begins is None and not ahead and known is None:
         return seen
     n = fit.residual.size
     counted = np.ones(n, dtype=bool) if seen.valid is None else seen.valid.copy()

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, count_alike, median
+from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
+from hmpim.identify.chance import BULK
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
@@ -17,16 +18,7 @@ from hmpim.identify.fitting.candidates import (
     spans_record,
     sums_to_noise,
 )
-from hmpim.identify.fitting.data import (
-    Counted,
-    Data,
-    Fits,
-    follows,
-    polished,
-    precision_for,
-    refit,
-    refit_all,
-)
+from hmpim.identify.fitting.data import Counted, Data, Fits, follows, polished, refit, refit_all
 from hmpim.identify.fitting.enrich import PLAIN, is_response
 from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem
 from hmpim.identify.fitting.least_squares import solved
@@ -117,7 +109,7 @@ class Course:
 def start(
     u: Real,
     y: Real,
-    given: Counted,
+    valid: Mask | None,
     known: Mask | None,
     intersample: Intersample | None,
     structures: tuple[StructureName, ...],
@@ -128,9 +120,9 @@ def start(
     if intersample is None and looks_held(u):
         intersample = "zoh"  # only a held input stands still and jumps
     natural: Intersample = "bandlimited" if intersample is None else intersample
-    rough = rough_response(u, _level(y, nuisance, given.valid), longest_delay=longest_lag(u.size))
+    rough = rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size))
     data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance)
-    course = begun(data, natural, structures, given)
+    course = begun(data, natural, structures, Counted(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
     return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
 
@@ -214,11 +206,19 @@ def interpolate_finely(course: Course) -> Course:
 
 
 def interpolated_for(course: Course, fit: Fit) -> Course | None:
-    """The course with an interpolation as fine as a fit needs; None where it is fine enough."""
+    """The course with an interpolation as fine as a fit needs; None where it is fine enough.
+
+    The interpolation error biases an estimate by its share of the output; the noise scatters it
+    by its own share over the root of the number of samples. The noise is taken from a median,
+    which ignores samples that the ends of the record spoil.
+    """
     if course.natural != "bandlimited":
         return None
     problem = course.data.problem("bandlimited", course.counted)
-    wanted = precision_for(problem, fit)
+    residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
+    spread = max(float(np.std(fit.prediction)), np.finfo(float).tiny)
+    noise = median(np.abs(residual[:: every_of(residual.size)])) / BULK / spread
+    wanted = PART * noise / float(np.sqrt(residual.size))
     if wanted * TWICE >= course.data.precision:
         return None
     used = problem.source.oversampling

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from hmpim.identify.arrays import Mask, Real, every_of, median
-from hmpim.identify.chance import BULK, FALSE_ALARM, SEARCHED
+from hmpim.identify.arrays import Mask, Real
+from hmpim.identify.chance import FALSE_ALARM, SEARCHED
 from hmpim.identify.fitting.fit import CONVERGED, Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, hidden_pole
 from hmpim.identify.fitting.rows import STAMPED_LATE
@@ -17,7 +17,7 @@ from hmpim.identify.noise.autoregression import autoregression
 from hmpim.identify.noise.level import level_of
 from hmpim.identify.noise.misfit import Misfit, misfit
 from hmpim.identify.signals import longest_lag
-from hmpim.identify.worth import PART, TWICE
+from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.sampled import PRECISION, SampledInput, prepare_input
 from hmpim.record import Intersample, is_held
@@ -31,7 +31,6 @@ __all__ = [
     "follows",
     "hopeless_beside",
     "polished",
-    "precision_for",
     "prepared",
     "refit",
     "refit_all",
@@ -152,19 +151,6 @@ def shifted(theta: Real, origin: Intersample, mode: Intersample) -> Real:
     """Parameters as a start under another assumption: a held input has half a sample less delay."""
     sooner = 0.5 * (float(is_held(origin)) - float(is_held(mode)))
     return delayed(theta, sooner)
-
-
-def precision_for(problem: Problem, fit: Fit) -> float:
-    """Interpolation error, as a share of the input, that stays well below the effect of noise.
-
-    The interpolation error biases an estimate by its share of the output; the noise scatters it
-    by its own share over the root of the number of samples. The noise is taken from a median,
-    which ignores samples that the ends of the record spoil.
-    """
-    residual = fit.residual if problem.valid is None else fit.residual[problem.valid]
-    spread = max(float(np.std(fit.prediction)), np.finfo(float).tiny)
-    noise = median(np.abs(residual[:: every_of(residual.size)])) / BULK / spread
-    return PART * noise / float(np.sqrt(residual.size))
 
 
 def polished(problem: Problem, fit: Fit, *, hopeless: float = np.inf) -> Fit:

@@ -32,7 +32,7 @@ from hmpim.identify.fitting.course import (
     start,
     turn_ahead,
 )
-from hmpim.identify.fitting.data import Counted, Fits, polished, refit_all
+from hmpim.identify.fitting.data import Fits, polished, refit_all
 from hmpim.identify.fitting.enrich import INTEGRATING, MODES, PLAIN, RICH
 from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
 from hmpim.identify.fitting.fit import Fit
@@ -63,7 +63,6 @@ def joint_fit(
     nuisance: Real | None = None,
     growing: bool = True,
     shared: bool = False,
-    begins: int | None = None,
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -88,9 +87,6 @@ def joint_fit(
     shared : bool
         Whether other inputs, whose fits are unfinished, move the output too: many poles need not
         leave white noise then.
-    begins : int, optional
-        First sample from which the free response of an unknown initial state is fitted; if None,
-        the record decides.
 
     Returns
     -------
@@ -98,10 +94,11 @@ def joint_fit(
     """
     if intersample == "sampled":
         return software_fit(u, y, valid, structures, nuisance)
-    given = Counted(valid=valid, begins=begins)
-    course = start(u, y, given, known, intersample, structures, nuisance, shared)
-    course = free_from_wander(turn_ahead(course))
-    course = find_beginning(interpolate_finely(course))
+    course = start(u, y, valid, known, intersample, structures, nuisance, shared)
+    course = turn_ahead(course)
+    course = free_from_wander(course)
+    course = interpolate_finely(course)
+    course = find_beginning(course)
     return chosen_of(course, structures, growing=growing)
 
 
@@ -125,9 +122,8 @@ def fit_likeliest(
         for j, u in inputs.items():
             found[j] = software_fit(u, y, valid, structures, nuisance)
         return _likeliest(found)
-    given = Counted(valid=valid, begins=None)
     courses = {
-        j: turn_ahead(start(u, y, given, known, intersample, structures, nuisance))
+        j: turn_ahead(start(u, y, valid, known, intersample, structures, nuisance))
         for j, u in inputs.items()
     }
     least = np.inf
