@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests_support import printed_by
+
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
 POSIX_ONLY = ("resource", "fcntl", "termios", "pty", "tty", "pwd", "grp", "syslog")
@@ -165,10 +167,7 @@ def test_each_imports_what_it_uses_alone():
         "except SystemExit:\n    print()\n    print(*sys.modules)\n"
         "hmpim.identify, hmpim.read, hmpim.run\nprint(*sys.modules)\n"
     )
-    said = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=900
-    )
-    lines = said.stdout.splitlines()
+    lines = printed_by(program).splitlines()
     alone, with_help, identifying = (set(lines[place].split()) for place in (0, -2, -1))
     assert {name for name in alone if name.startswith("hmpim")} == {"hmpim"}
     assert not {"numpy", "scipy"} & alone

@@ -10,11 +10,14 @@ import asyncio
 import os
 import shutil
 import subprocess
+import sys
 import threading
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from typing import NoReturn
 
@@ -71,6 +74,18 @@ def in_studies(*values) -> list:
     """Values of a parameter, or tuples of several, that only `make studies` takes."""
     several = [value if isinstance(value, tuple) else (value,) for value in values]
     return [pytest.param(*these, marks=pytest.mark.study) for these in several]
+
+
+def few_of(few: Iterable[tuple], *grid: Iterable) -> list:
+    """A few points of a grid; `make studies` takes all the others too."""
+    few = list(few)
+    return [*few, *in_studies(*(one for one in product(*grid) if one not in few))]
+
+
+def printed_by(program: str) -> str:
+    """What a program of Python prints in a process of its own, which must not fail."""
+    command = [sys.executable, "-c", program]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=900).stdout
 
 
 @cache

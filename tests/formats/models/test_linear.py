@@ -11,7 +11,7 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models import export
 from hmpim.formats.models.refined import pade_error
 from hmpim.model import Model, frequency_response
-from tests_support import in_studies, run_octave
+from tests_support import few_of, run_octave
 
 from .conftest import FS, result_of
 
@@ -58,11 +58,7 @@ SCRIPTS += [one for one in product(TOOLS, ["second"], BETWEEN) if one not in SCR
 
 
 @pytest.mark.parametrize(
-    ("tool", "name", "intersample"),
-    [
-        *SCRIPTS,
-        *in_studies(*(o for o in product(TOOLS, sorted(MODELS), BETWEEN) if o not in SCRIPTS)),
-    ],
+    ("tool", "name", "intersample"), few_of(SCRIPTS, TOOLS, sorted(MODELS), BETWEEN)
 )
 def test_scripts_simulate_what_the_model_says(tool, name, intersample, tmp_path):
     if tool == "control":

@@ -4,7 +4,6 @@ import json
 import re
 import runpy
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from hmpim.errors import ArgumentError
 from hmpim.formats.models import TARGETS, LinearPartOnly, export
 from hmpim.model import Model, NonlinearPart
 from hmpim.record import Finding
-from tests_support import in_studies, run_octave
+from tests_support import few_of, run_octave
 
 from .conftest import FS, compiled_c, result_of
 
@@ -74,7 +73,7 @@ def in_turn(names, others, both=()):
     names, others = sorted(names), sorted(others)
     pairs = [(name, others[k % len(others)]) for k, name in enumerate(names)]
     pairs += [(name, other) for name in both for other in others if (name, other) not in pairs]
-    return [*pairs, *in_studies(*(p for p in product(names, others) if p not in pairs))]
+    return few_of(pairs, names, others)
 
 
 @pytest.mark.usefixtures("needs_cc")

@@ -4,7 +4,6 @@ import runpy
 import subprocess
 import sys
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from hmpim.formats.models import export
 from hmpim.identify import Identification, Parameters
 from hmpim.model import Model, frequency_response
 from hmpim.record import Finding
-from tests_support import in_studies
+from tests_support import few_of
 
 from .conftest import FS, compiled_c, result_of
 
@@ -64,7 +63,7 @@ MODELS = {
 HELD = ("feedforward", "half open", "held", "integrator", "zero")
 """Models whose programs are run with a held input as well."""
 PROGRAMS = [(name, "bandlimited") for name in sorted(MODELS)] + [(name, "zoh") for name in HELD]
-OTHERS = [p for p in product(sorted(MODELS), ("foh", "zoh", "bandlimited")) if p not in PROGRAMS]
+BETWEEN = ("foh", "zoh", "bandlimited")
 
 
 def walk(seed: int) -> np.ndarray:
@@ -72,7 +71,7 @@ def walk(seed: int) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("needs_cc")
-@pytest.mark.parametrize(("name", "intersample"), [*PROGRAMS, *in_studies(*OTHERS)])
+@pytest.mark.parametrize(("name", "intersample"), few_of(PROGRAMS, sorted(MODELS), BETWEEN))
 def test_programs_give_what_the_model_gives(name, intersample, tmp_path):
     model = replace(MODELS[name], intersample=intersample, band=20.0)
     result, u = result_of(model), walk(1)

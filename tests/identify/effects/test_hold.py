@@ -1,7 +1,5 @@
 """Held outputs: period and phase bounded by every change, and none seen where there is none."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -9,7 +7,7 @@ from hypothesis import strategies as st
 
 from hmpim.identify.effects.hold import detect_hold, updates
 from hmpim.rigs import Sensor
-from tests_support import examples, in_studies
+from tests_support import examples, few_of
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -79,10 +77,7 @@ STEPS, NOISES = (None, 0.003, 0.05, 0.2), (0.0, 0.002, 0.02, 0.1)
 FEW = [(step, NOISES[(k + j) % 4]) for k, step in enumerate(STEPS) for j in (0, 1)]
 
 
-@pytest.mark.parametrize(
-    ("step", "noise"),
-    [*FEW, *in_studies(*(pair for pair in product(STEPS, NOISES) if pair not in FEW))],
-)
+@pytest.mark.parametrize(("step", "noise"), few_of(FEW, STEPS, NOISES))
 def test_an_output_that_follows_at_every_sample_is_not_held(step, noise):
     rng = np.random.default_rng(0)
     for dynamics in ({}, {"natural_frequency": 10.0, "damping_ratio": 0.4}):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import scipy
-from scipy import signal
 
 import hmpim
 from hmpim.identify.judgement.feedback import chances_without_feedback
+from tests_support import answer_of
 
 
 def by_regression(u, left, counts, ahead=12):
@@ -65,8 +65,7 @@ def test_even_samples_whose_stamps_jitter_are_no_loop():
     rng, fs = np.random.default_rng(1), 200.0
     time = np.arange(2000) / fs
     u = np.sin(2 * np.pi * (0.1 * time + time**2))
-    top, below, _ = signal.cont2discrete(([1.0], [2.5e-4, 1.3e-2, 1.0]), 1 / fs, method="foh")
-    y = signal.lfilter(top.ravel(), below, u) + 0.01 * rng.standard_normal(time.size)
+    y = answer_of([1.0], [2.5e-4, 1.3e-2, 1.0], u, time) + 0.01 * rng.standard_normal(time.size)
     stamps = time + 3e-4 * rng.standard_normal(time.size)
     (pair,) = hmpim.identify(hmpim.Record.from_arrays({"u": u}, {"y": y}, time=stamps))
     codes = [w.code for w in pair.warnings]

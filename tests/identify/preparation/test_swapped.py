@@ -1,14 +1,13 @@
 """Swapped columns are recognised and said, at once; a unit in its right order is not accused."""
 
 from importlib import import_module
-from itertools import product
 
 import numpy as np
 import pytest
 
 import hmpim
 from hmpim.identify.preparation.swapped import is_swapped
-from tests_support import assert_share, in_studies
+from tests_support import assert_share, few_of, in_studies
 
 FS = 200.0
 T = np.arange(2000) / FS
@@ -45,10 +44,7 @@ DELAYS, NOISES = (0.0, 0.01, 0.05, 0.15, 1.0), (0.0, 0.003, 0.03, 0.3)
 FEW = [(0.0, 0.003), (0.05, 0.3)]
 
 
-@pytest.mark.parametrize(
-    ("delay", "noise"),
-    [*FEW, *in_studies(*(pair for pair in product(DELAYS, NOISES) if pair not in FEW))],
-)
+@pytest.mark.parametrize(("delay", "noise"), few_of(FEW, DELAYS, NOISES))
 def test_what_is_in_order_is_never_accused(delay, noise):
     told = np.ones(T.size, dtype=bool)
     for name, u in inputs(1).items():

@@ -1,7 +1,5 @@
 """The table as a rig: records, determinism, friction, pace, and what identification finds."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from hmpim.rigs import MotionTable, Rig, commands_of
 from hmpim.rigs.table import AXES, FIG_4, TablePosition, exact_bandwidth, linear_response
 from hmpim.rigs.table.linear import phase_crossing
 from hmpim.stimulus import Limits, Sine, Stimulus, design
-from tests_support import in_studies
+from tests_support import few_of, in_studies
 
 pytest.importorskip("mujoco")
 
@@ -95,11 +93,10 @@ def test_encoders_read_the_truth_to_their_resolution():
 
 EACH = [("roll", "PVA"), ("elevation", "P")]
 """The fastest axis, the slowest and each mode, pitch in PV below; the others in `make studies`."""
-OTHERS = [case for case in product(AXES, MODES) if case not in EACH]
 
 
 @pytest.mark.parametrize("seconds", [4.0, *in_studies(10.0)])
-@pytest.mark.parametrize(("axis", "mode"), [*EACH, *in_studies(*OTHERS)])
+@pytest.mark.parametrize(("axis", "mode"), few_of(EACH, AXES, MODES))
 def test_identified_and_exact_bandwidths_agree(axis, mode, seconds):
     """Nothing is told to the fit; what is exact is what the record's own statement means."""
     table = MotionTable(friction=False, mode=mode)
