@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hmpim.identify.fitting import spectral
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly, reweighted
 from hmpim.identify.fitting.start import RoughResponse
 from hmpim.model.dynamics import STRUCTURES, theta_of
@@ -31,6 +32,23 @@ def test_a_climb_ends_at_the_system_that_made_the_response(lag):
     found = fitted_roughly(rough(2.0 * ANSWER, lag), STRUCTURES["second_order"], starts, steps=40)
     assert found.error < 1e-9
     assert found.likely[0] == pytest.approx(TRUE, rel=1e-4)
+
+
+def test_starts_that_gain_nothing_more_cost_nothing_more(monkeypatch):
+    """The first start is the truth, the second far behind it; the third climbs."""
+    counts, errors = [], spectral._Rough.errors
+
+    def counted(self, thetas):
+        counts.append(len(thetas))
+        return errors(self, thetas)
+
+    monkeypatch.setattr(spectral._Rough, "errors", counted)
+    starts = TRUE + np.array([[0.0, 0.0, 0.0], [60.0, 3.0, 0.0], [1.0, 0.2, 0.1]])
+    answer = ANSWER * (1.0 + 0.1 * np.random.default_rng(0).normal(size=OMEGA.size))
+    found = fitted_roughly(rough(answer), STRUCTURES["second_order"], starts)
+    assert counts[0] == 3
+    assert counts[-1] == 1
+    assert found.likely[0] == pytest.approx(TRUE, rel=0.05)
 
 
 def test_sanathanan_and_koerner_name_the_denominator_at_the_right_delay():

@@ -8,8 +8,10 @@ import scipy
 
 import hmpim
 from hmpim.identify.fitting.fit import Problem, fit_structure
+from hmpim.identify.fitting.joint import joint_fit
 from hmpim.identify.noise.whiteness import is_white
-from hmpim.identify.nonlinear.rows import linear_part, linear_part_finely
+from hmpim.identify.nonlinear import rows
+from hmpim.identify.nonlinear.rows import Command, dead_zone, linear_part, linear_part_finely
 from hmpim.model import STRUCTURES, prepare_input
 from hmpim.model.fine import FINE
 from hmpim.model.nonlinear import NonlinearPart
@@ -292,3 +294,20 @@ def test_friction_of_the_leading_input_of_several():
     gain = coupling.parameters.scale_factor
     assert abs(gain.value - 0.02) < 4 * gain.spread
     assert gain.spread < 0.002
+
+
+def test_a_dead_zone_that_newton_does_not_find_is_given_up_early(monkeypatch):
+    """Of noise, each step suggests another width."""
+    u = sweep(T)
+    y = hmpim.simulate(MODEL, u, fs=FS, intersample="bandlimited")
+    joint = joint_fit(u, y + np.random.default_rng(3).normal(0.0, 0.03, y.size))
+    taken = []
+
+    def counted(*given):
+        taken.append(given)
+        return fit_structure(*given)
+
+    monkeypatch.setattr(rows, "fit_structure", counted)
+    command = Command(u=u, intersample="bandlimited")
+    assert dead_zone(command, joint.problem, joint.best.fit) is None
+    assert len(taken) < rows.TURNS

@@ -7,6 +7,7 @@ from hmpim.identify.fitting.candidates import pruned
 from hmpim.identify.fitting.data import RETURNS, TASTE, Counted, Data, Fits, shifted
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem, fit_structure
+from hmpim.identify.fitting.trial import as_likely
 from hmpim.identify.worth import TWICE
 from hmpim.model.dynamics import StructureName
 from hmpim.record import BETWEEN, Intersample
@@ -60,14 +61,9 @@ def fit_under_each_assumption(
             behind.append(fit)
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
-    def as_likely(parameters: int) -> float:
-        """Largest objective at which a fit with so many parameters is about as likely."""
-        fewer = best.structure.parameters - parameters
-        return least * float(np.exp((fewer * np.log(count) + 2 * CLEARLY) / count))
-
     def most(fit: Fit) -> float:
         """Largest objective at which a fit is continued; the likelihood counts if noise is left."""
-        own = as_likely(fit.structure.parameters) if best.is_white else np.inf
+        own = as_likely(best, fit.structure.parameters, count) if best.is_white else np.inf
         return min(own, TWICE * least)
 
     def moved(some: list[Fit]) -> Fits:
@@ -88,7 +84,7 @@ def fit_under_each_assumption(
         fewer = best.structure.parameters - fit.structure.parameters
         if fewer <= 0 or fit.structure.name in PLAIN:  # plain ones are far behind a rich one
             continue
-        likely = as_likely(fit.structure.parameters)
+        likely = as_likely(best, fit.structure.parameters, count)
         for mode, problem in problems.items():
             other = refit_between(problem, fit, natural, mode, iterations=TASTE, hopeless=likely)
             if not other.converged and other.objective < TWICE**2 * least:
@@ -96,7 +92,7 @@ def fit_under_each_assumption(
             fitted.append((mode, other))
     for mode, problem in problems.items():
         own = [fit for m, fit in fitted if m == mode]
-        enough = as_likely(0) if best.is_white else TWICE * least
+        enough = as_likely(best, 0, count) if best.is_white else TWICE * least
         if min(fit.objective for fit in own) < enough:
             fitted += [(mode, fit) for fit in pruned(problem, own, structures)]
     return fitted

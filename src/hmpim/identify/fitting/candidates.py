@@ -27,6 +27,7 @@ from hmpim.identify.fitting.modes import grown_modes
 from hmpim.identify.fitting.rows import STAMPED_LATE
 from hmpim.identify.fitting.spectral import condensed, fitted_roughly
 from hmpim.identify.fitting.start import RoughResponse, rough_response, searched, starting_values
+from hmpim.identify.fitting.trial import as_likely
 from hmpim.identify.noise.misfit import unexplained_response
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, MOST, MUCH, NEARLY, PART, TWICE
@@ -364,13 +365,10 @@ def best_of(
     precision = CONVERGED / leading.share
     hopeless = np.inf if far_off else hopeless_beside(structure, rivals)
     count = problem.counted * leading.share
-    price = float(np.log(count)) / count
-    paid = min(  # objective at which Schwarz's criterion equals that of the best rival
-        fit.objective * float(np.exp(price * (fit.structure.parameters - structure.parameters)))
-        for fit in rivals
-    )
+    own = structure.parameters
+    paid = min(as_likely(fit, own, count, behind=0.0) for fit in rivals)
     if not far_off:  # fits that are about as likely are needed: the intervals cover them
-        hopeless = min(hopeless, paid * float(np.exp(2 * CLEARLY / count)))
+        hopeless = min(hopeless, *(as_likely(fit, own, count) for fit in rivals))
     tried: list[Fit] = []
     for theta in starts:
         fit = fit_structure(

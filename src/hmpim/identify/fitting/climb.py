@@ -26,6 +26,12 @@ at the usual precision."""
 _STEEPEST = 1e6
 """Damping from which no smaller step is tried."""
 
+_IN_A_ROW = 5
+"""Latest steps by which a search is judged that has not converged."""
+
+_CREEPS = 10.0
+"""Average gain of these steps, over a negligible one, below which the search is given up."""
+
 _POORLY, _WELL = 0.25, 0.75
 """Share of the predicted gain below which the damping grows, and above which it falls."""
 
@@ -94,7 +100,7 @@ def climb(
 
     def descended(best: E) -> tuple[E, bool]:
         sizes = [theta.size for theta in best.thetas]
-        damping = _DAMPING
+        damping, costs = _DAMPING, [best.cost]
         for _ in range(iterations):
             here = np.concatenate(best.thetas)
             free, normal, moment, decrement = _free_directions(best, sizes, bounded)
@@ -123,9 +129,13 @@ def climb(
                 damping *= 10.0
                 refused += 1
             fell, best = best.cost - trial.cost, trial
+            costs.append(best.cost)
             near = decrement < _NEAR * negligible and _remaining(decrement, fell) < negligible
             if near or (fell < negligible and damping <= 10 * _DAMPING):
                 return best, True
+            creeps = fell < _CREEPS * negligible and _recent(costs) < _CREEPS * negligible
+            if creeps or _ends_above(costs, hopeless, iterations):
+                return best, False
             if fell < _POORLY * predicted:
                 damping *= 2.0
             elif fell > _WELL * predicted and not refused:
@@ -169,6 +179,24 @@ def _remaining(decrement: float, fell: float) -> float:
     it remains; if the third derivative is the cause, 9/4 as much.
     """
     return 2.25 * (decrement - fell) * ((decrement - fell) / decrement)  # of any unit
+
+
+def _recent(costs: list[float]) -> float:
+    """Average gain of the latest steps; infinite after too few."""
+    known = len(costs) > _IN_A_ROW
+    return (costs[-_IN_A_ROW - 1] - costs[-1]) / _IN_A_ROW if known else np.inf
+
+
+def _ends_above(costs: list[float], hopeless: float, iterations: int) -> bool:
+    """Whether a search at its pace so far would still end above a hopeless cost.
+
+    In a parabola that allows steps of one size only, the root of the cost falls at a steady pace.
+    """
+    done = len(costs) - 1
+    if done < 2 * _IN_A_ROW or costs[-1] <= hopeless:
+        return False
+    first, last, enough = np.sqrt([costs[0], costs[-1], hopeless])
+    return bool(last - enough > (first - last) / done * (iterations - done))
 
 
 def _limited(structure: Structure, theta: Real, step: Real) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real, count_alike, every_of, median
-from hmpim.identify.chance import BULK
+from hmpim.identify.chance import BULK, CLEARLY
 from hmpim.identify.fitting.beginning import REACH, begin_at, begin_later, count_in, in_motion
 from hmpim.identify.fitting.between import fit_under_each_assumption
 from hmpim.identify.fitting.candidates import (
@@ -25,7 +25,7 @@ from hmpim.identify.fitting.least_squares import solved
 from hmpim.identify.fitting.plainer import reduced
 from hmpim.identify.fitting.start import rough_response
 from hmpim.identify.fitting.tail import fit_with_tail
-from hmpim.identify.fitting.whitening import is_likelier, prewhitened_of
+from hmpim.identify.fitting.whitening import criterion_in_colour, prewhitened_of
 from hmpim.identify.fitting.zeros import with_second_zero
 from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import FEW, MATERIAL, PART, TWICE, WORTH
@@ -380,15 +380,20 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
     """Fits with one slow tail, two, and so on, while each is clearly likelier."""
     data, problem, found = course.data, course.problem, list[Fit]()
+    least: float | None = None
     while data.keeps_samples:
         every = [*fits, *found]
         tailed = fit_with_tail(problem, every, course.others)
         if tailed is None:
             break
-        best = min(every, key=lambda fit: fit.objective)
-        if not is_likelier(data, problem, tailed, best):
+        if least is None:
+            best = min(every, key=lambda fit: fit.objective)
+            least = criterion_in_colour(data, problem, best)
+        own = criterion_in_colour(data, problem, tailed, hopeless=least - 2 * CLEARLY)
+        if own >= least - 2 * CLEARLY:
             break
         found.append(tailed)
+        least = own
     return found
 
 

@@ -332,7 +332,7 @@ def grow(
             starts.append(_PROBE * test.scale)
         tried: list[Fit] = []
         for lag in starts:
-            least = min((fit.objective for fit in tried), default=np.inf)
+            least = min(fit.objective for fit in [best, *tried])
             theta = with_pole(structure, best.theta, lag)
             tried.append(fit_structure(problem, richer, theta, hopeless=least))
         found = min(tried, key=lambda fit: fit.objective)

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY, ONE_SIDED
+from hmpim.identify.chance import ONE_SIDED
 from hmpim.identify.fitting.beginning import in_motion, look_again
 from hmpim.identify.fitting.between import refit_between
 from hmpim.identify.fitting.candidates import is_poor
@@ -38,7 +38,7 @@ from hmpim.identify.fitting.feedforward_rows import may_be_fed_forward
 from hmpim.identify.fitting.fit import Fit
 from hmpim.identify.fitting.growth import HiddenPole, grow, one_more_pole
 from hmpim.identify.fitting.software import software_fit
-from hmpim.identify.fitting.trial import JointFit, Trial, likeliest_of, trial_of
+from hmpim.identify.fitting.trial import JointFit, Trial, as_likely, likeliest_of, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER
 from hmpim.identify.fitting.whitening import weighed_by_noise
 from hmpim.identify.fitting.zeros import SECOND_ZERO, mirrored, second_zeros
@@ -238,7 +238,9 @@ def try_neighbours(
     if SECOND_ZERO in structures:
         mode = leading.intersample
         problem = course.data.problem(mode, course.counted)
-        seconds = _trials_of(joint, mode, second_zeros(problem, leading.fit, hidden))
+        seconds = _trials_of(
+            joint, mode, second_zeros(problem, leading.fit, hidden, count=joint.counted)
+        )
         found += seconds
         white = (trial for trial in seconds if trial.fit.is_white)
         likeliest = min([leading, *white], key=lambda trial: trial.criterion)
@@ -264,7 +266,7 @@ def _mirrored(joint: JointFit, course: Course) -> list[Trial]:
     """The best trial with a zero in the other half plane, if that is about as likely."""
     best = joint.best
     problem = course.data.problem(best.intersample, course.counted)
-    hopeless = best.fit.objective * float(np.exp(2 * CLEARLY / joint.counted))
+    hopeless = as_likely(best.fit, best.fit.structure.parameters, joint.counted)
     return _trials_of(joint, best.intersample, mirrored(problem, best.fit, hopeless=hopeless))
 
 
@@ -386,10 +388,8 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        hopeless = TWICE * best.objective
-        fit = refit_between(
-            problem, trial.fit, mode, "feedforward", iterations=40, hopeless=hopeless
-        )
+        limits = {"hopeless": as_likely(best, structure.parameters, count)}
+        fit = refit_between(problem, trial.fit, mode, "feedforward", iterations=40, **limits)
         found.append(trial_of("feedforward", fit, count))
     return found
 

@@ -33,7 +33,7 @@ damping exceeds it."""
 _LEAST = 1e-12
 """Share of each diagonal element that is added to normal equations: less is rounding."""
 
-_REWEIGHTINGS = 6
+_REWEIGHTINGS = 4
 """Times that Sanathanan and Koerner's equations are weighted by the latest denominator."""
 
 
@@ -79,22 +79,28 @@ def fitted_roughly(
     """Fit a structure without integrators from all starts, (k, 1 + order), at once.
 
     The rough response is best `condensed`. The delay stays if it is `held`. At most so many
-    `steps` are taken.
+    `steps` are taken. A start is followed until it no longer gains, or misses sixteen times as
+    much as the best one.
     """
     model = _Rough(rough, structure)
     errors, (normal, moment) = model.errors(thetas), model.normal()
     thetas, damping = thetas.copy(), np.full(len(thetas), 1e-3)
+    going = np.arange(len(thetas))
     for _ in range(steps):
         step = _damped(normal, moment, damping) * (np.arange(thetas.shape[1]) >= held)
-        moved = _bounded(structure, thetas + step)
+        moved, before = _bounded(structure, thetas[going] + step), errors[going]
         then = model.errors(moved)
-        better, still = then < errors, ~(errors - then > _STILL * errors)
+        better, still = then < before, ~(before - then > _STILL * before)
         damping = np.where(better, damping / _FACTOR, damping * _FACTOR)
-        thetas[better], errors[better] = moved[better], then[better]
-        if np.all(still & (better | (damping > _FACTOR))):
+        thetas[going[better]], errors[going[better]] = moved[better], then[better]
+        goes_on = ~(still & (better | (damping > _FACTOR)))
+        goes_on &= errors[going] < TWICE**4 * errors.min()
+        if not goes_on.any():
             break
         for own, new in zip((normal, moment), model.normal(), strict=True):
             own[better] = new[better]
+        going, damping = going[goes_on], damping[goes_on]
+        normal, moment = normal[goes_on], moment[goes_on]
     least = float(errors.min())
     order = [i for i in np.argsort(errors) if errors[i] <= TWICE * least]
     power = float(rough.weight @ np.abs(rough.response) ** 2)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmpim.identify.chance import LIKELIER
+from hmpim.identify.chance import CLEARLY, LIKELIER
 from hmpim.identify.fitting.enrich import PLAIN
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.growth import HiddenPole
@@ -13,7 +13,7 @@ from hmpim.identify.result import Candidate
 from hmpim.identify.worth import MUCH
 from hmpim.record import Intersample
 
-__all__ = ["JointFit", "Trial", "likeliest_of", "schwarz", "trial_of"]
+__all__ = ["JointFit", "Trial", "as_likely", "likeliest_of", "schwarz", "trial_of"]
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -90,6 +90,15 @@ class JointFit:
 def schwarz(cost: float, count: float, parameters: int) -> float:
     """Schwarz's criterion of a sum of squares over so many independent samples; lower is better."""
     return float(count * np.log(cost / count) + parameters * np.log(count))
+
+
+def as_likely(fit: Fit, parameters: int, count: float, *, behind: float = 2 * CLEARLY) -> float:
+    """Objective at which a fit with so many parameters trails another one by so much.
+
+    By Schwarz's criterion of `count` independent samples; by default the odds are 400 to 1.
+    """
+    fewer = fit.structure.parameters - parameters
+    return fit.objective * float(np.exp((fewer * np.log(count) + behind) / count))
 
 
 def trial_of(mode: Intersample, fit: Fit, count: float, *, floor: float = 0.0) -> Trial:

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.data import Counted, Data, follows, refit
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.start import rough_response
@@ -15,7 +14,7 @@ from hmpim.identify.signals import longest_lag
 from hmpim.identify.worth import PART
 from hmpim.record import Intersample
 
-__all__ = ["is_likelier", "prewhitened_of", "weighed_by_noise"]
+__all__ = ["criterion_in_colour", "prewhitened_of", "weighed_by_noise"]
 
 
 def prewhitened_of(data: Data, mode: Intersample, fits: list[Fit], seen: Counted) -> Data | None:
@@ -53,18 +52,18 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
     return replace(data, noise=noise, level=level)
 
 
-def is_likelier(data: Data, problem: Problem, found: Fit, best: Fit) -> bool:
-    """Whether a richer fit is clearly likelier than the best one, each in noise of its own colour.
+def criterion_in_colour(
+    data: Data, problem: Problem, fit: Fit, *, hopeless: float = np.inf
+) -> float:
+    """Schwarz's criterion of a fit in noise of its own colour, given up if it promises `hopeless`.
 
     One common colour would favour the fit from whose residual it is estimated.
     """
-
-    def criterion(fit: Fit) -> float:
-        noise = data.noise_left(problem, fit)
-        coloured = problem.coloured(noise)
-        again = refit(coloured, fit)
-        parameters = fit.structure.parameters + noise.size - 1
-        count = problem.counted  # whitening omits few samples, but more for a longer filter
-        return schwarz(again.objective * count / coloured.counted, count, parameters)
-
-    return criterion(best) - criterion(found) > 2 * CLEARLY
+    noise = data.noise_left(problem, fit)
+    coloured = problem.coloured(noise)
+    parameters = fit.structure.parameters + noise.size - 1
+    count = problem.counted  # whitening omits few samples, but more for a longer filter
+    share = coloured.counted / count
+    most = share * count * float(np.exp((hopeless - parameters * np.log(count)) / count))
+    again = refit(coloured, fit, hopeless=most)
+    return schwarz(again.objective / share, count, parameters)

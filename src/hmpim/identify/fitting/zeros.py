@@ -18,6 +18,7 @@ from hmpim.identify.arrays import Real
 from hmpim.identify.fitting.candidates import best_of, pruned
 from hmpim.identify.fitting.fit import Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.growth import HiddenPole, scale_of, with_pole
+from hmpim.identify.fitting.trial import as_likely
 from hmpim.model.dynamics import STRUCTURES, Structure, StructureName
 
 __all__ = ["SECOND_ZERO", "is_servo", "mirrored", "second_zeros", "with_second_zero"]
@@ -97,7 +98,7 @@ def _starts(fits: list[Fit]) -> list[Real]:
     return third + [np.append(fit.theta[0], theta[1:]) for fit, theta in pairs]  # delay unchanged
 
 
-def second_zeros(problem: Problem, fit: Fit, hidden: HiddenPole) -> list[Fit]:
+def second_zeros(problem: Problem, fit: Fit, hidden: HiddenPole, *, count: float) -> list[Fit]:
     """Fits with a second zero in either half plane, next to a servo's fit with one.
 
     Parameters
@@ -106,6 +107,8 @@ def second_zeros(problem: Problem, fit: Fit, hidden: HiddenPole) -> list[Fit]:
         The data, and the chosen fit.
     hidden : HiddenPole
         Its test for one more pole, which says how slow another zero may be.
+    count : float
+        Independent samples.
     """
     if not is_servo(fit.structure):
         return []
@@ -113,4 +116,6 @@ def second_zeros(problem: Problem, fit: Fit, hidden: HiddenPole) -> list[Fit]:
     if fit.structure.order == 2:
         theta = with_pole(fit.structure, fit.theta, hidden.lead)
     starts = [delayed(theta, later) for later in (hidden.lead, -hidden.lead)]
-    return [fit_structure(problem, STRUCTURES[SECOND_ZERO], start) for start in starts]
+    structure = STRUCTURES[SECOND_ZERO]
+    hopeless = as_likely(fit, structure.parameters, count)
+    return [fit_structure(problem, structure, start, hopeless=hopeless) for start in starts]

@@ -51,6 +51,9 @@ __all__ = [
 _Lag = Callable[[Fit], float]
 """Lag of the force behind the command, in samples, by a fit."""
 
+_SHRINKING = 2
+"""Steps of Newton's method for a dead zone, from which on each must be smaller than the last."""
+
 _GUESSES = 2
 """Rows from which the size of friction is guessed, each from that of the former."""
 
@@ -162,11 +165,15 @@ def _regressed(tried: list[NonlinearRow], problem: Problem, fit: Fit) -> tuple[R
 
 
 def dead_zone(command: Command, problem: Problem, start: Fit) -> NonlinearRow | None:
-    """A dead zone of the input, which is known once its width is: Newton's method for the width."""
+    """A dead zone of the input, which is known once its width is: Newton's method for the width.
+
+    It is given up once its steps no longer become smaller: the residual has another cause.
+    """
     fine = finely(command.u, command.intersample)
     largest, structure = float(np.max(np.abs(fine))), start.structure
     tried = [_dead(fine, problem, start, gap * largest) for gap in GAPS]
     fit, half = start, _likeliest(tried, problem, start).size
+    changes: list[float] = []
     for _ in range(TURNS):
         lived = sampled(np.sign(fine) * np.maximum(np.abs(fine) - half, 0.0))
         source = prepare_input(lived, "bandlimited", rest=problem.begins is None)
@@ -180,6 +187,9 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> NonlinearRow | 
             return None
         if abs(change) < MATERIAL**2 * half:
             return _dead(fine, problem, fit, half)
+        changes.append(abs(change))
+        if len(changes) > _SHRINKING and changes[-1] >= changes[-2]:
+            break
     return None
 
 
