@@ -50,15 +50,7 @@ def fit_under_each_assumption(
     best = min(fits, key=lambda fit: fit.objective)
     least, count = best.objective, data.problem(natural, seen).counted * best.share
     clearly = float(np.expm1(2 * CLEARLY / count)) * least
-    leading, trailing, behind = [], [], []
-    for fit in fits:
-        plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
-        if hopeful and (plain or fit.objective < least + clearly):
-            leading.append(fit)
-        elif hopeful or plain:
-            trailing.append(fit)
-        else:
-            behind.append(fit)
+    leading, trailing, behind = _by_promise(fits, least, clearly)
     problems = {mode: data.problem(mode, seen) for mode in BETWEEN if mode != natural}
 
     def most(fit: Fit) -> float:
@@ -96,3 +88,19 @@ def fit_under_each_assumption(
         if min(fit.objective for fit in own) < enough:
             fitted += [(mode, fit) for fit in pruned(problem, own, structures)]
     return fitted
+
+
+def _by_promise(
+    fits: list[Fit], least: float, clearly: float
+) -> tuple[list[Fit], list[Fit], list[Fit]]:
+    """Fits that may lead under another assumption, that would trail there, and all others."""
+    leading, trailing, behind = list[Fit](), list[Fit](), list[Fit]()
+    for fit in fits:
+        plain, hopeful = fit.structure.name in PLAIN, fit.objective < TWICE * least
+        if hopeful and (plain or fit.objective < least + clearly):
+            leading.append(fit)
+        elif hopeful or plain:
+            trailing.append(fit)
+        else:
+            behind.append(fit)
+    return leading, trailing, behind

@@ -1,7 +1,8 @@
 """The Levenberg-Marquardt algorithm, for models that are linear in most parameters."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, TypeVar
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -97,79 +98,120 @@ def climb(
     bool
         Whether the last step was negligible.
     """
-
-    def descended(best: E) -> tuple[E, bool]:
-        sizes = [theta.size for theta in best.thetas]
-        damping, costs = _DAMPING, [best.cost]
-        for _ in range(iterations):
-            here = np.concatenate(best.thetas)
-            free, normal, moment, decrement = _free_directions(best, sizes, bounded)
-            negligible = precision * best.cost / max(counted - here.size - best.linear.size, 1)
-            if decrement < negligible:
-                return best, True
-            if best.cost - decrement > max(hopeless, best.cost / TWICE**2):
-                return best, False
-            refused = 0
-            while True:
-                step = np.zeros(here.size)
-                step[free] = solved(normal, moment, damping)
-                steps = parts_of(step, sizes)
-                share = min(
-                    _limited(s, t, d)
-                    for s, t, d in zip(structures, best.thetas, steps, strict=True)
-                )
-                moved = bounded(parts_of(here + share * step, sizes))
-                trial = evaluated(moved)
-                taken = (np.concatenate(moved) - here)[free]
-                predicted = float(taken @ (2.0 * moment - normal @ taken))
-                if trial.cost < best.cost:
-                    break
-                if damping > _STEEPEST or abs(predicted) < negligible:
-                    return best, True  # no descent: a kink, or the limit of the arithmetic
-                damping *= 10.0
-                refused += 1
-            fell, best = best.cost - trial.cost, trial
-            costs.append(best.cost)
-            near = decrement < _NEAR * negligible and _remaining(decrement, fell) < negligible
-            if near or (fell < negligible and damping <= 10 * _DAMPING):
-                return best, True
-            creeps = fell < _CREEPS * negligible and _recent(costs) < _CREEPS * negligible
-            if creeps or _ends_above(costs, hopeless, iterations):
-                return best, False
-            if fell < _POORLY * predicted:
-                damping *= 2.0
-            elif fell > _WELL * predicted and not refused:
-                damping = max(damping / 10.0, 1e-9)
-        return best, False
-
-    best, converged = descended(evaluated(thetas))
+    search = _Search(evaluated, structures, bounded, counted, iterations, precision, hopeless)
+    best, converged = search.descended(evaluated(thetas))
     other = [regrouped(s, theta) for s, theta in zip(structures, best.thetas, strict=True)]
     if all(theta is None for theta in other):
         return best, converged
     grouped = [
         here if theta is None else theta for here, theta in zip(best.thetas, other, strict=True)
     ]
-    again, ended = descended(evaluated(bounded(grouped)))
+    again, ended = search.descended(evaluated(bounded(grouped)))
     return (again, ended) if again.cost <= best.cost else (best, converged)
 
 
-def _free_directions(
-    best: Evaluated, sizes: list[int], bounded: Callable[[Sequence[Real]], list[Real]]
-) -> tuple[Mask, Real, Real, float]:
-    """Parameters that no bound holds, their normal equations, and Newton's decrement.
+@dataclass(frozen=True, slots=True)
+class _Search(Generic[E]):
+    """A descent from one start; the parameters are those of `climb`."""
 
-    The decrement is what a full step would still gain. A parameter is held where descent leads
-    it out of its bounds (D. P. Bertsekas, SIAM J. Control Optim. 20, 1982); the others then move
-    as if it were known.
+    evaluated: Callable[[Sequence[Real]], E]
+    structures: Sequence[Structure]
+    bounded: Callable[[Sequence[Real]], list[Real]]
+    counted: int
+    iterations: int
+    precision: float
+    hopeless: float
+
+    def descended(self, best: E) -> tuple[E, bool]:
+        """Where it ends, and whether the last step was negligible."""
+        damping, costs = _DAMPING, [best.cost]
+        for _ in range(self.iterations):
+            quadratic = _free_directions(best, self.bounded)
+            unknowns = sum(theta.size for theta in best.thetas) + best.linear.size
+            negligible = self.precision * best.cost / max(self.counted - unknowns, 1)
+            decrement = quadratic.decrement
+            if decrement < negligible:
+                return best, True
+            if best.cost - decrement > max(self.hopeless, best.cost / TWICE**2):
+                return best, False
+            lower = self._lower(best, quadratic, damping, negligible)
+            if lower is None:
+                return best, True  # no descent: a kink, or the limit of the arithmetic
+            fell, refused = best.cost - lower.best.cost, lower.damping > damping
+            best, damping = lower.best, lower.damping
+            costs.append(best.cost)
+            near = decrement < _NEAR * negligible and _remaining(decrement, fell) < negligible
+            if near or (fell < negligible and damping <= 10 * _DAMPING):
+                return best, True
+            creeps = fell < _CREEPS * negligible and _recent(costs) < _CREEPS * negligible
+            if creeps or _ends_above(costs, self.hopeless, self.iterations):
+                return best, False
+            if fell < _POORLY * lower.predicted:
+                damping *= 2.0
+            elif fell > _WELL * lower.predicted and not refused:
+                damping = max(damping / 10.0, 1e-9)
+        return best, False
+
+    def _lower(
+        self, best: E, quadratic: "_Quadratic", damping: float, negligible: float
+    ) -> "_Lower[E] | None":
+        """A step that lowers the cost, with as much damping as it takes; None without one."""
+        here, moment = np.concatenate(best.thetas), quadratic.moment
+        sizes = [theta.size for theta in best.thetas]
+        while True:
+            step = np.zeros(here.size)
+            step[quadratic.free] = solved(quadratic.normal, moment, damping)
+            each = zip(self.structures, best.thetas, parts_of(step, sizes), strict=True)
+            share = min(_limited(s, t, d) for s, t, d in each)
+            moved = self.bounded(parts_of(here + share * step, sizes))
+            trial = self.evaluated(moved)
+            taken = (np.concatenate(moved) - here)[quadratic.free]
+            predicted = float(taken @ (2.0 * moment - quadratic.normal @ taken))
+            if trial.cost < best.cost:
+                return _Lower(trial, predicted, damping)
+            if damping > _STEEPEST or abs(predicted) < negligible:
+                return None
+            damping *= 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Lower(Generic[E]):
+    """A step that lowers the cost: where it ends, the gain that was predicted, and its damping."""
+
+    best: E
+    predicted: float
+    damping: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Quadratic:
+    """The cost around a point, along the parameters that no bound holds (`free`).
+
+    The decrement is what a full step would still gain.
+    """
+
+    free: Mask
+    normal: Real
+    moment: Real
+    decrement: float
+
+
+def _free_directions(
+    best: Evaluated, bounded: Callable[[Sequence[Real]], list[Real]]
+) -> _Quadratic:
+    """The quadratic model of the cost, by normal equations.
+
+    A parameter is held where descent leads it out of its bounds (D. P. Bertsekas, SIAM J. Control
+    Optim. 20, 1982); the others then move as if it were known.
     """
     normal, moment = best.normal()
-    here = np.concatenate(best.thetas)
-    down = here + _NUDGE * np.sign(moment)
-    free = np.concatenate(bounded(parts_of(down, sizes))) == down
+    down = np.concatenate(best.thetas) + _NUDGE * np.sign(moment)
+    inside = bounded(parts_of(down, [theta.size for theta in best.thetas]))
+    free = np.concatenate(inside) == down
     if not free.all():
         normal, moment = normal[np.ix_(free, free)], moment[free]
     toward = solved(normal, moment) if free.any() else moment
-    return free, normal, moment, float(toward @ moment)
+    return _Quadratic(free, normal, moment, float(toward @ moment))
 
 
 def _remaining(decrement: float, fell: float) -> float:
