@@ -38,7 +38,7 @@ from hmpim.identify.fitting.course import (
 from hmpim.identify.fitting.data import Fits, follows
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.joint import chosen_of
-from hmpim.identify.fitting.tail import hidden_tail
+from hmpim.identify.fitting.tail import fit_with_tail, hidden_tail
 from hmpim.identify.fitting.trial import JointFit
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.colour import tone_of
@@ -138,6 +138,8 @@ def _drifting(question: Question, seen: Imperfections, course: Course) -> Output
     joint, drifting = found
     if follows(course.data, joint.best.fit) or _leaves_tail(joint):
         return None
+    if _is_tail(former, joint, question.structures):
+        return None
     return OutputFit(fits=(joint,), drifting=drifting)
 
 
@@ -221,6 +223,16 @@ class _WithRows:
         others = tuple(name for name in course.others if name in names)
         joint = chosen_of(replace(course, others=others), names, fitted=self.between)
         return OutputFit(fits=(joint,))
+
+
+def _is_tail(steady: Course, joint: JointFit, structures: tuple[StructureName, ...]) -> bool:
+    """Whether a slow tail of the response is likelier than the drift of a joint fit.
+
+    In a record that begins slowly, a tail follows the input, but resembles a drift.
+    """
+    tailed = fit_with_tail(steady.problem, steady.fits, structures)
+    count = joint.best.fit.nuisance.size
+    return tailed is not None and criterion_gain(joint, count, tailed, steady.problem) < 0.0
 
 
 def _leaves_tail(joint: JointFit) -> bool:
