@@ -241,11 +241,12 @@ def _leaves_tail(joint: JointFit) -> bool:
 
 
 def _plain_beside_drift(
-    question: Question, seen: Imperfections, led: Led, finish: Callable[[], OutputFit]
+    question: Question, seen: Imperfections, led: Led, steady_of: Callable[[Led], OutputFit]
 ) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `led` are plain fits of the strong inputs, with a constant bias; `finish` finishes these.
+    `led` are plain fits of the strong inputs, with a constant bias. `steady_of` makes complete ones
+    of given inputs: with a drift more may be found, and the same are compared without it.
     """
     known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))
@@ -265,7 +266,7 @@ def _plain_beside_drift(
     found = with_plain_drift(first.problem, first.best.fit, begun, fitted)
     if found is None or not found[0].related or _leaves_tail(found[0]):
         return None
-    steady = finish()
+    steady = steady_of({**led, **known})
     former = steady.fits[asked]
     if former.best.fit.is_white and steady.slow is None:
         return None

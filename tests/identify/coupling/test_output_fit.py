@@ -9,7 +9,8 @@ from scipy.signal import lfilter
 
 import hmpim
 from hmpim.errors import RecordError
-from hmpim.identify.coupling.output_fit import _join, _responds
+from hmpim.identify.coupling import output_fit
+from hmpim.identify.coupling.output_fit import _join, _may_drift, _responds, fit_together
 from hmpim.identify.coupling.pairs import Pairs
 from hmpim.identify.coupling.weak import whitening_of
 from hmpim.identify.fitting.joint import joint_fit
@@ -359,6 +360,72 @@ def test_the_weaker_input_is_fitted_again_once_the_leading_one_has_joined():
         pair = found["y", name]
         assert (pair.structure, pair.verdict) == ("second_order", "ok")
         assert abs(pair.delay.value - delay) < 1e-3
+
+
+@pytest.mark.parametrize("seed", [10, 5])
+def test_plain_fits_made_once_more_spare_a_drift_and_whole_searches(seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    inputs = []
+    for _ in range(4):
+        noise = np.convolve(rng.standard_normal(1000), np.hanning(5) / 3, "same")
+        inputs.append(noise * np.clip((np.arange(1000) - 10) / 20, 0, 1))
+    y = np.zeros(1000)
+    for gain, u in zip((1.0, 0.9, 0.8, 0.7), inputs, strict=True):
+        late, frequency, damping = rng.uniform([0.01, 6.0, 0.2], [0.3, 30.0, 1.0])
+        y = y + gain * second_order(u, 100.0, late, frequency, damping)
+    y = y + 0.03 * np.std(y) * rng.standard_normal(1000)
+    made = []
+
+    def fitted(u, y, **options):
+        made.append(len(options["structures"]) > 3)
+        return joint_fit(u, y, **options)
+
+    monkeypatch.setattr(output_fit, "joint_fit", fitted)
+    named = {f"u{j}": u for j, u in enumerate(inputs)}
+    found = hmpim.identify(hmpim.Record.from_arrays(named, {"y": y}, fs=100.0))
+    assert {pair.structure for pair in found.pairs} == {"second_order"}
+    assert sum(made) == len(inputs)
+    assert len(made) < 4 * len(inputs)
+
+
+@pytest.mark.parametrize(("slow", "expected"), [(1.5, True), (0.0, False)])
+def test_a_drift_is_tried_only_if_it_explains_much_of_what_is_left(slow, expected):
+    rng = np.random.default_rng(0)
+    y = 0.01 * rng.standard_normal(2000) + slow * np.linspace(-1, 1, 2000) ** 3
+    for u, (natural, damping, delay) in zip(INPUTS[:2], OWN, strict=False):
+        y = y + second_order(u, FS, delay, natural, damping)
+    pairs = Pairs(y=y, valid=None, fits={}, strong=[], alike=())
+    for i, u in enumerate(INPUTS[:2]):  # a mode is missing
+        rest = pairs.without_others(i)
+        options = {"intersample": "bandlimited", "structures": ("first_order",)}
+        pairs.put(i, joint_fit(u, rest, **options, growing=False))
+        pairs.strong.append(i)
+    pairs.refine(pairs.kept, None)
+    assert whitening_of(pairs.residual()) is not None
+    assert _may_drift(pairs) == expected
+
+
+def test_inputs_found_beside_a_drift_are_fitted_without_it_too(monkeypatch):
+    rng = np.random.default_rng(0)
+    y = second_order(INPUTS[0], FS, 0.02, 8.0, 0.5) + 0.5 * second_order(
+        INPUTS[1], FS, 0.03, 6, 0.7
+    )
+    y = y + 0.01 * rng.standard_normal(2000)
+    options = {"known": None, "intersample": "bandlimited", "structures": ("second_order",)}
+    monkeypatch.setattr(output_fit, "_join", lambda *_: None)
+    monkeypatch.setattr(output_fit, "_may_drift", lambda _: True)
+    steady = []
+
+    def fit_drift(led, steady_of):
+        (leading,) = led.values()
+        other = joint_fit(INPUTS[1], y - leading.best.fit.prediction, **options)
+        steady.append(steady_of({**led, 1: other}))
+        return steady[0]
+
+    found = fit_together(list(INPUTS[:2]), y, valid=None, **options, fit_drift=fit_drift)
+    assert found is steady[0]
+    assert found.strong == (True, True)
+    assert abs(found.fits[1].best.fit.delay / FS - 0.03) < 1e-3
 
 
 def test_a_full_search_is_not_repeated_for_a_change_below_the_noise():

@@ -1,9 +1,10 @@
 """One output, several inputs at once: each pair's fit, with the others' contributions subtracted.
 
 The input that moves the output most is fitted as if alone. Others join as long as one explains a
-large part of the residual, each with its own beginning and assumption between the samples. They are
-fitted in turns, each to the output without the others, until moving all at once gains little. Weak
-ones (`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
+large part of the residual, each with its own beginning and assumption between the samples. Once all
+are known, their initial states are decided together. They are fitted in turns, each to the output
+without the others, until moving all at once gains little. Weak ones
+(`hmpim.identify.coupling.weak`) are fitted with the noise whitened.
 
 Then all pairs are moved at once, and only then is each coupling tested, with the others free: of
 two inputs that are alike at some frequencies, the first may have explained a share of the other's
@@ -21,9 +22,10 @@ import numpy as np
 from hmpim.identify.arrays import Mask, Real
 from hmpim.identify.chance import CLEARLY, FALSE_ALARM
 from hmpim.identify.coupling.joint_errors import covariances, derivatives
-from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution
+from hmpim.identify.coupling.pairs import Pairs, constant_of, contribution, with_nuisance
 from hmpim.identify.coupling.residual import misfit_at_any_lag
 from hmpim.identify.coupling.weak import coupling_fit, whitening_of
+from hmpim.identify.effects.disturbance import held_rows
 from hmpim.identify.effects.drift import Drifting, drift_rows
 from hmpim.identify.effects.gain import GainChange
 from hmpim.identify.effects.hum import Humming
@@ -112,8 +114,8 @@ class OutputFit:
         return np.sum(trends, axis=0) if trends else None
 
 
-FitDrift = Callable[[Led, Callable[[], OutputFit]], OutputFit | None]
-"""Fit plain dynamics with a drift, from the strong inputs' fits and what finishes these without."""
+FitDrift = Callable[[Led, Callable[[Led], OutputFit]], OutputFit | None]
+"""Fit plain dynamics with a drift, given the strong inputs' fits and what fits inputs without."""
 
 
 def without_slow(led: Led) -> Led:
@@ -151,8 +153,8 @@ def fit_together(
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the plain fits to the strong inputs and a function that
-    finishes plain dynamics without; its value is returned unless it is None. If `strong_only`, only
-    strong inputs are fitted, with plain dynamics, and the others count as unrelated.
+    fits such to given inputs without; its value is returned unless it is None. If `strong_only`,
+    only strong inputs are fitted, with plain dynamics, and the others count as unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -165,31 +167,57 @@ def fit_together(
     pairs.resume(begun, nuisance)
     if led and strong_only:
         _fit_strong(inputs, pairs, plainly)
+        pairs.refine(pairs.kept, None)
     joined = len(pairs.strong)
     _join(inputs, pairs, plainly)
+    more = len(pairs.strong) > joined and whitening_of(pairs.residual()) is not None
     if strong_only:
-        if len(pairs.strong) > joined:  # the others were fitted next to what these explain
-            _fit_strong(inputs, pairs, plainly)
+        pairs = _fitted_once_more(inputs, pairs, plainly) if more else pairs
         pairs.refine(pairs.kept, None)
         none = replace(pairs.fits[pairs.strong[0]], related=False)
         return OutputFit(
             fits=tuple(pairs.fits.get(j, none) for j in range(len(inputs))),
             strong=tuple(j in pairs.strong for j in range(len(inputs))),
         )
-    if fit_drift is not None and whitening_of(pairs.residual()) is not None:
-        found = {j: pairs.fits[j] for j in pairs.strong}
+    if fit_drift is not None and _may_drift(pairs):
 
-        def steady() -> OutputFit:
-            again = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
-            again.resume(found, nuisance)
-            if len(found) > 1:  # which samples count is decided anew
-                _join(inputs, again, plainly)
-            return _finished(inputs, again, fitted, plainly, plain)
+        def steady(found: Led) -> OutputFit:
+            same = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
+            same.resume(found, nuisance)
+            same = _fitted_once_more(inputs, same, plainly)
+            _fit_couplings(inputs, same, plain)
+            return _moved_at_once(same)
 
-        drifting = fit_drift(found, steady)
+        drifting = fit_drift({j: pairs.fits[j] for j in pairs.strong}, steady)
         if drifting is not None:
             return drifting
+    if more and pairs.cost < (PART * pairs.spread) ** 2:
+        again = _fitted_once_more(inputs, pairs, plainly)
+        if TWICE * again.cost < pairs.cost or whitening_of(again.residual()) is None:
+            pairs = again
     return _finished(inputs, pairs, fitted, plainly, structures)
+
+
+def _may_drift(pairs: Pairs) -> bool:
+    """Whether a drift, added to the strong inputs' fits, explains much of what they leave."""
+    if whitening_of(pairs.residual()) is None:
+        return False
+    if any(map(_is_slow, pairs.fits.values())):  # this fit may explain it
+        return True
+    again, rows = pairs.copied(), drift_rows(pairs.y.size)
+    for i in pairs.strong:
+        again.put(i, with_nuisance(pairs.fits[i], rows))
+    again.refine(again.kept, None)
+    return again.cost < (1.0 - PART) * pairs.cost
+
+
+def _fitted_once_more(inputs: list[Real], pairs: Pairs, plainly: Callable[..., JointFit]) -> Pairs:
+    """The pairs with each strong input fitted again, as each was found before the later ones."""
+    again = pairs.copied()
+    _fit_strong(inputs, again, plainly)
+    again.refine(again.kept, None)
+    again.free_states(inputs)
+    return again
 
 
 def _finished(
@@ -206,7 +234,7 @@ def _finished(
     for _ in range(_TURNS):
         before, reached, rest = pairs.structures, pairs.cost, pairs.residual()
         fits, masks = {**pairs.fits}, {**pairs.masks}
-        _fit_strong(inputs, pairs, richly)
+        _fit_strong(inputs, pairs, richly, only_new=True)
         pairs.refine(pairs.kept, None)
         if pairs.cost > TWICE * reached and whitening_of(rest) is None:  # it ended elsewhere
             pairs.fits.update(fits)
@@ -243,12 +271,31 @@ def _moved_at_once(pairs: Pairs) -> OutputFit:
     )
 
 
-def _fit_strong(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> None:
-    """Fit each strong input, in place, to the output without the others, if that has changed."""
+def _fit_strong(
+    inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit], *, only_new: bool = False
+) -> None:
+    """Fit each strong input, in place, to the output without the others.
+
+    With `only_new`, only if that has changed since the last such fit. Where the residual is white,
+    the free responses of the others are known.
+    """
+    white = whitening_of(pairs.residual()) is None
     for i in pairs.strong:
         rest, counted = pairs.without_others(i), pairs.counted(j for j in pairs.kept if j != i)
-        if pairs.is_new(i, rest, counted):
-            pairs.put(i, fitted(inputs[i], rest, valid=counted))
+        if not only_new or pairs.is_new(i, rest, counted):
+            fit = partial(fitted, inputs[i], rest, valid=counted)
+            own, free = pairs.fits[i].problem.nuisance, pairs.free_of_others(i)
+            pairs.put(i, fit() if white or not len(free) else _fit_beside(fit, own, free))
+
+
+def _fit_beside(fitted: Callable[..., JointFit], own: Real | None, free: Real) -> JointFit:
+    """Fit an input with rows of its own, (k, n), and the free responses of the others, (m, n).
+
+    Those of similar modes are nearly interchangeable: if one changes, the others must.
+    """
+    rows = free if own is None else np.vstack([own, free])
+    fit = fitted(nuisance=rows, small=len(free))
+    return held_rows(fit, len(rows) - len(free))
 
 
 def fit_leading(
@@ -288,6 +335,7 @@ def _join(inputs: list[Real], pairs: Pairs, fitted: Callable[..., JointFit]) -> 
             pairs.strong.append(i)
             pairs.refine(pairs.kept, None)
             tried, (share, summed) = {}, _shares(inputs, pairs)  # the residual is clearer now
+    pairs.free_states(inputs)
 
 
 def _shares(inputs: list[Real], pairs: Pairs) -> tuple[dict[int, float], set[int]]:

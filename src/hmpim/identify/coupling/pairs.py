@@ -2,19 +2,24 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
 from hmpim.identify.arrays import Mask, Real, count_alike
 from hmpim.identify.chance import SEARCHED
 from hmpim.identify.coupling.joint_errors import common, gained_by
+from hmpim.identify.fitting.beginning import REACH, begin_at, needs_free
+from hmpim.identify.fitting.data import Counted, prepared
 from hmpim.identify.fitting.fit import Fit, Problem
 from hmpim.identify.fitting.fit import fit_together as fit_all
+from hmpim.identify.fitting.sampled_rows import part_of
 from hmpim.identify.fitting.trial import JointFit
-from hmpim.identify.noise.whiteness import effective_share
+from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
+from hmpim.model.sampled import WINDOW, interpolation_error
 
 __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
@@ -48,11 +53,29 @@ class Pairs:
         """The output without the contributions of all inputs but one."""
         return self.without(j for j in self.fits if j != i)
 
+    def free_of_others(self, i: int) -> Real:
+        """Free responses of all strong inputs but one, (k, n), if they begin early."""
+        rows = [np.zeros((0, self.y.size))]
+        for j in self.strong:
+            fit, begins = self.fits[j], self.fits[j].problem.begins
+            if j != i and fit.related and begins is not None and self.is_early(begins):
+                rows.append(part_of(fit.problem, fit.best.fit.structure, fit.best.fit.theta).free)
+        return np.vstack(rows)
+
+    def is_early(self, begins: int) -> bool:
+        """Whether a free response that begins there leaves most samples to the other inputs."""
+        return begins <= PART * self.y.size
+
     @property
     def cost(self) -> float:
         """Mean square of the residual."""
         rest, counts = self.residual(), self.counted(self.kept)
         return float(np.mean(np.square(rest if counts is None else rest[counts])))
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of the output."""
+        return float(np.std(self.y if self.valid is None else self.y[self.valid]))
 
     @property
     def structures(self) -> list[Structure]:
@@ -62,7 +85,7 @@ class Pairs:
     @property
     def dominant(self) -> set[int]:
         """Inputs whose motion is so large that an error of their model looks like a coupling."""
-        least = PART * float(np.std(self.y if self.valid is None else self.y[self.valid]))
+        least = PART * self.spread
         return {j for j in self.strong if float(np.std(contribution(self.fits[j]))) > least}
 
     def apart(self, problem: Problem, i: int) -> Problem:
@@ -83,7 +106,7 @@ class Pairs:
         """Start from fits to strong inputs, with `nuisance`, (k, n), as their rows.
 
         If they had other rows, which samples count is decided anew: it may have been decided
-        wrongly.
+        wrongly. Only those before a free response do not count.
         """
         others = {i for i, fit in led.items() if not _has_nuisance(fit, nuisance)}
         for i, fit in led.items():
@@ -91,7 +114,16 @@ class Pairs:
             self.strong.append(i)
         if len(led) > 1 or others:
             self.refine(self.kept, None)
-            self.masks.update(dict.fromkeys(led))
+            self.masks.update({i: self._since(fit.problem.begins) for i, fit in led.items()})
+
+    def _since(self, begins: int | None) -> Mask | None:
+        """Samples from which a free response is known; before them, it grows without bound."""
+        return None if begins is None else np.arange(self.y.size) >= begins
+
+    def copied(self) -> Self:
+        """The same in a state of its own, without the searches so far."""
+        fits, strong, masks = dict(self.fits), list(self.strong), dict(self.masks)
+        return replace(self, fits=fits, strong=strong, masks=masks, _searched={})
 
     def is_new(self, i: int, rest: Real, counted: Mask | None) -> bool:
         """Whether an input's data differ from those of its last full search; if so, note them.
@@ -141,6 +173,30 @@ class Pairs:
             self.fits[j] = replace(moved_fit, problem=own, weighed=own, effective_share=share)
         return problems, found
 
+    def free_states(self, inputs: Sequence[Real]) -> None:
+        """Fit the initial states of all strong inputs, (n,), if the residual requires them.
+
+        Each was fitted before the others were known, whose motion hides its free response.
+        """
+        strong = [self.fits[i] for i in self.strong]
+        resting = [fit for fit in strong if fit.problem.begins is None]
+        modes = sum(fit.best.fit.structure.order for fit in resting)
+        sampled = any(fit.best.fit.structure.sampled for fit in strong)
+        if len(strong) < 2 or not modes or sampled or is_white(self.residual()):
+            return
+        begins = int(np.ceil(max(0.0, *(fit.best.fit.delay for fit in strong)))) + REACH
+        given = Counted(valid=self.counted(self.kept), begins=None)
+        later = begin_at(given, begins, self.y.size)
+        if later is None or not self.is_early(begins):
+            return
+        fits, masks, before = dict(self.fits), dict(self.masks), self.residual()
+        for i in self.strong:
+            self.put(i, _begun(self.fits[i], inputs[i], later))
+        self.refine(self.kept, None)
+        if not _explains(modes, before, self.residual(), self.counted(self.kept)):
+            self.fits.update(fits)
+            self.masks.update(masks)
+
     def together(self, whitening: Real | None, *, drop: bool = True) -> bool:
         """Move all couplings at once; drop the weakest if it adds nothing; return if dropped."""
         dominant = self.dominant
@@ -164,6 +220,21 @@ class Pairs:
             return False
         self.fits[least] = replace(self.fits[least], related=False)
         return True
+
+
+def _begun(fit: JointFit, u: Real, seen: Counted) -> JointFit:
+    """The same fit, not yet refined, with the initial state of its input, (n,), unknown."""
+    missed = interpolation_error(u, fit.problem.source.oversampling)
+    source = prepared(u, fit.best.intersample, rest=False, precision=max(missed, WINDOW))
+    problem = replace(fit.problem, source=source, valid=seen.valid, begins=seen.first)
+    return replace(fit, problem=problem, weighed=problem, forgotten=seen.first or 0)
+
+
+def _explains(modes: int, before: Real, after: Real, counts: Mask | None) -> bool:
+    """Whether free responses of so many modes lower a residual, (n,), by more than chance."""
+    power, left = (rest if counts is None else rest[counts] for rest in (before, after))
+    count = effective_share(left) * left.size
+    return bool(needs_free(float(power @ power), float(left @ left), count, modes))
 
 
 def _has_nuisance(fit: JointFit, nuisance: Real | None) -> bool:

@@ -8,7 +8,7 @@ from hmpim.identify.fitting.fit import FORGETS, Fit, Problem
 from hmpim.identify.fitting.trial import JointFit, Trial
 from hmpim.identify.noise.autoregression import innovation_gain
 
-__all__ = ["criterion_gain", "without_rows"]
+__all__ = ["criterion_gain", "held_rows", "without_rows"]
 
 
 def criterion_gain(joint: JointFit, count: int, former: Fit, without: Problem) -> float:
@@ -62,4 +62,29 @@ def without_rows(joint: JointFit, which: slice) -> JointFit:
         weighed=replace(joint.weighed, y=y),
         best=trials.get(id(joint.best)) or reduced(joint.best),
         trials=tuple(trials.values()),
+    )
+
+
+def held_rows(joint: JointFit, kept: int) -> JointFit:
+    """Subtract from the output what rows after the first `kept` explain, and drop these rows."""
+    found, rows = without_rows(joint, slice(kept, None)), joint.problem.fixed()[1 + kept :]
+
+    def fewer(problem: Problem) -> Problem:
+        own = problem.nuisance
+        return replace(problem, nuisance=own[:kept] if kept and own is not None else None)
+
+    def reduced(trial: Trial) -> Trial:
+        fit = trial.fit
+        if fit.prediction.size:  # of rivals, nothing is subtracted yet
+            fit = replace(fit, prediction=fit.prediction - fit.nuisance[kept:] @ rows)
+        return replace(trial, fit=replace(fit, nuisance=fit.nuisance[:kept]))
+
+    trials = {id(trial): reduced(trial) for trial in found.trials}
+    return replace(
+        found,
+        problem=fewer(found.problem),
+        weighed=fewer(found.weighed),
+        best=trials.get(id(found.best)) or reduced(found.best),
+        trials=tuple(trials.values()),
+        rivals=tuple(map(reduced, found.rivals)),
     )

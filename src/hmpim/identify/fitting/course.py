@@ -115,13 +115,15 @@ def start(
     structures: tuple[StructureName, ...],
     nuisance: Real | None,
     shared: bool = False,
+    small: int = 0,
 ) -> Course:
     """Fit each plain structure from spectra, and integrators if these lead."""
     if intersample is None and looks_held(u):
         intersample = "zoh"  # only a held input stands still and jumps
     natural: Intersample = "bandlimited" if intersample is None else intersample
-    rough = rough_response(u, _level(y, nuisance, valid), longest_delay=longest_lag(u.size))
-    data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance)
+    trends = nuisance if nuisance is None or not small else nuisance[:-small]
+    rough = rough_response(u, _level(y, trends, valid), longest_delay=longest_lag(u.size))
+    data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance, small=small)
     course = begun(data, natural, structures, Counted(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
     return replace(course, alone=intersample is not None, known=known, fits=fits, shared=shared)
@@ -163,7 +165,7 @@ def turn_ahead(course: Course) -> Course:
     lag = data.rough.ahead
     if lag is None or best.is_white:
         return course
-    level = _level(data.y, data.nuisance, seen.valid)
+    level = _level(data.y, data.trends, seen.valid)
     rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
     ahead = replace(data, rough=rough)
     counted = np.ones(level.size, dtype=bool) if seen.valid is None else seen.valid.copy()

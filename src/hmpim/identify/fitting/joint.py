@@ -63,6 +63,7 @@ def joint_fit(
     nuisance: Real | None = None,
     growing: bool = True,
     shared: bool = False,
+    small: int = 0,
 ) -> JointFit:
     """Fit every structure and keep the one that the record supports.
 
@@ -87,6 +88,8 @@ def joint_fit(
     shared : bool
         Whether other inputs, whose fits are unfinished, move the output too: many poles need not
         leave white noise then.
+    small : int
+        How many of the last rows of `nuisance` explain little, so that spectra ignore them.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def joint_fit(
     """
     if intersample == "sampled":
         return software_fit(u, y, valid, structures, nuisance)
-    course = start(u, y, valid, known, intersample, structures, nuisance, shared)
+    course = start(u, y, valid, known, intersample, structures, nuisance, shared, small)
     course = turn_ahead(course)
     course = free_from_wander(course)
     course = interpolate_finely(course)
