@@ -245,8 +245,9 @@ def _plain_beside_drift(
 ) -> OutputFit | None:
     """Plain dynamics of several inputs and a drift, if they leave white noise; None otherwise.
 
-    `led` are plain fits of the strong inputs, with a constant bias. `steady_of` makes complete ones
-    of given inputs: with a drift more may be found, and the same are compared without it.
+    `led` are plain fits of the strong inputs, with a constant bias. `steady_of` fits given inputs
+    without a drift. It gets all inputs found with the drift, since there may be more of them, so
+    that the same inputs are compared.
     """
     known, (asked, first) = without_slow(led), next(iter(led.items()))
     plain = OutputFit(fits=(first,))

@@ -40,7 +40,7 @@ def found(*, moving, seed=5):
     return inputs, pairs
 
 
-@pytest.mark.parametrize("moving", [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize("moving", [(True, True), (True, False)])
 def test_states_are_free_where_an_input_moved_before_the_record(moving):
     _, pairs = found(moving=moving)
     assert is_white(pairs.residual())
@@ -51,6 +51,27 @@ def test_no_state_is_free_where_the_record_begins_at_rest():
     _, pairs = found(moving=(False, False))
     assert is_white(pairs.residual())
     assert all(fit.problem.begins is None for fit in pairs.fits.values())
+
+
+def test_states_that_explain_nothing_stay_at_rest():
+    """A slow wave is no free response, though it is not white."""
+    inputs, pairs = found(moving=(False, False))
+    pairs = replace(pairs, y=pairs.y + 0.05 * np.sin(0.05 * np.arange(SIZE)))
+    fits, masks = dict(pairs.fits), dict(pairs.masks)
+    assert not is_white(pairs.residual())
+    pairs.free_states(inputs)
+    assert all(pairs.fits[i] is fit for i, fit in fits.items())
+    assert pairs.masks == masks
+
+
+def test_states_of_inputs_that_move_nothing_are_not_asked():
+    inputs, pairs = found(moving=(True, True))
+    late = replace(pairs.fits[1], related=False)
+    late.best.fit.theta[0] = SIZE / 2
+    pairs.fits[1] = late
+    pairs.fits[0] = replace(pairs.fits[0], problem=replace(pairs.fits[0].problem, begins=None))
+    pairs.free_states(inputs)
+    assert pairs.fits[1] is late
 
 
 def test_samples_before_a_free_response_do_not_count_with_other_rows():
@@ -93,6 +114,9 @@ def test_rows_that_are_held_are_subtracted_from_the_output():
     assert held.best.fit.nuisance == pytest.approx(free.best.fit.nuisance[:1])
     assert held.problem.y == pytest.approx(y - explained)
     assert held.best.fit.prediction == pytest.approx(free.best.fit.prediction - explained)
+    (rival,) = held_rows(replace(free, rivals=(free.best,)), 1).rivals
+    assert rival.fit.nuisance == pytest.approx(free.best.fit.nuisance[:1])
+    assert rival.fit.prediction == pytest.approx(free.best.fit.prediction - explained)
 
 
 def test_spectra_ignore_rows_that_explain_little():

@@ -58,7 +58,7 @@ def test_a_parabola_ends_in_a_step_or_two():
 
 
 def test_a_search_that_creeps_is_given_up():
-    """Of each gain's tenth part nothing would come to matter: a negligible one is 1e-5 here."""
+    """Steps that gain less than ten negligible gains; a negligible gain is 1e-5 here."""
     creeping = {"floor": 1.0, "scale": 1.0, "t0": 0.0, "overstated": 1000.0}
     _, converged, taken = climbed(0.15, **creeping)  # gains 4.5e-5 a step
     assert not converged
@@ -77,5 +77,5 @@ def test_a_search_that_would_end_far_above_hopeless_is_given_up():
     assert t == 10.0
     assert climbed(0.0, **far)[2] == 41
     t, converged, _ = climbed(0.0, floor=1e-3, scale=1.0, t0=30.0, hopeless=1.0)
-    assert converged  # the pace rises on the way down
+    assert converged  # 30 of 40 steps are enough
     assert abs(t - 30.0) < 1e-3

@@ -115,7 +115,8 @@ class OutputFit:
 
 
 FitDrift = Callable[[Led, Callable[[Led], OutputFit]], OutputFit | None]
-"""Fit plain dynamics with a drift, given the strong inputs' fits and what fits inputs without."""
+"""Fit plain dynamics with a drift. Arguments: the fits to the strong inputs, and a function that
+fits given inputs without a drift."""
 
 
 def without_slow(led: Led) -> Led:
@@ -153,8 +154,9 @@ def fit_together(
 
     If the strong inputs do not leave white noise, richer dynamics may explain a drift: `fit_drift`
     then fits plain dynamics with one, given the plain fits to the strong inputs and a function that
-    fits such to given inputs without; its value is returned unless it is None. If `strong_only`,
-    only strong inputs are fitted, with plain dynamics, and the others count as unrelated.
+    fits plain dynamics without a drift to given inputs; its value is returned unless it is None. If
+    `strong_only`, only strong inputs are fitted, with plain dynamics, and the others count as
+    unrelated.
     """
     fitted = partial(joint_fit, known=known, intersample=intersample, nuisance=nuisance)
     if len(inputs) == 1:
@@ -173,7 +175,6 @@ def fit_together(
     more = len(pairs.strong) > joined and whitening_of(pairs.residual()) is not None
     if strong_only:
         pairs = _fitted_once_more(inputs, pairs, plainly) if more else pairs
-        pairs.refine(pairs.kept, None)
         none = replace(pairs.fits[pairs.strong[0]], related=False)
         return OutputFit(
             fits=tuple(pairs.fits.get(j, none) for j in range(len(inputs))),
@@ -202,7 +203,8 @@ def _may_drift(pairs: Pairs) -> bool:
     """Whether a drift, added to the strong inputs' fits, explains much of what they leave."""
     if whitening_of(pairs.residual()) is None:
         return False
-    if any(map(_is_slow, pairs.fits.values())):  # this fit may explain it
+    related = (pairs.fits[i] for i in pairs.strong if pairs.fits[i].related)
+    if any(map(_is_slow, related)):  # this fit may explain it
         return True
     again, rows = pairs.copied(), drift_rows(pairs.y.size)
     for i in pairs.strong:
@@ -212,7 +214,7 @@ def _may_drift(pairs: Pairs) -> bool:
 
 
 def _fitted_once_more(inputs: list[Real], pairs: Pairs, plainly: Callable[..., JointFit]) -> Pairs:
-    """The pairs with each strong input fitted again, as each was found before the later ones."""
+    """Fit each strong input once more: it was fitted before the later ones were found."""
     again = pairs.copied()
     _fit_strong(inputs, again, plainly)
     again.refine(again.kept, None)
@@ -276,8 +278,8 @@ def _fit_strong(
 ) -> None:
     """Fit each strong input, in place, to the output without the others.
 
-    With `only_new`, only if that has changed since the last such fit. Where the residual is white,
-    the free responses of the others are known.
+    With `only_new`, only if that has changed since the last such fit. Unless the residual is white,
+    the free responses of the others may change too (`_fit_beside`).
     """
     white = whitening_of(pairs.residual()) is None
     for i in pairs.strong:

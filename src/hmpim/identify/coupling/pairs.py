@@ -19,7 +19,7 @@ from hmpim.identify.noise.whiteness import effective_share, is_white
 from hmpim.identify.worth import PART, TWICE
 from hmpim.model.dynamics import Structure
 from hmpim.model.response import slowest_time_constant
-from hmpim.model.sampled import WINDOW, interpolation_error
+from hmpim.model.sampled import PRECISION, WINDOW, interpolation_error
 
 __all__ = ["Pairs", "constant_of", "contribution", "with_nuisance"]
 
@@ -121,7 +121,7 @@ class Pairs:
         return None if begins is None else np.arange(self.y.size) >= begins
 
     def copied(self) -> Self:
-        """The same in a state of its own, without the searches so far."""
+        """An independent copy that remembers no full search."""
         fits, strong, masks = dict(self.fits), list(self.strong), dict(self.masks)
         return replace(self, fits=fits, strong=strong, masks=masks, _searched={})
 
@@ -174,11 +174,13 @@ class Pairs:
         return problems, found
 
     def free_states(self, inputs: Sequence[Real]) -> None:
-        """Fit the initial states of all strong inputs, (n,), if the residual requires them.
+        """Free the initial states of all strong inputs if the residual requires it.
 
-        Each was fitted before the others were known, whose motion hides its free response.
+        `inputs` are (n,). Each fit was made before the other inputs were known, and their motion
+        hid its free response.
         """
-        strong = [self.fits[i] for i in self.strong]
+        some = [i for i in self.strong if self.fits[i].related]
+        strong = [self.fits[i] for i in some]
         resting = [fit for fit in strong if fit.problem.begins is None]
         modes = sum(fit.best.fit.structure.order for fit in resting)
         sampled = any(fit.best.fit.structure.sampled for fit in strong)
@@ -187,10 +189,10 @@ class Pairs:
         begins = int(np.ceil(max(0.0, *(fit.best.fit.delay for fit in strong)))) + REACH
         given = Counted(valid=self.counted(self.kept), begins=None)
         later = begin_at(given, begins, self.y.size)
-        if later is None or not self.is_early(begins):
+        if later is None or not self.is_early(later.first or 0):
             return
         fits, masks, before = dict(self.fits), dict(self.masks), self.residual()
-        for i in self.strong:
+        for i in some:
             self.put(i, _begun(self.fits[i], inputs[i], later))
         self.refine(self.kept, None)
         if not _explains(modes, before, self.residual(), self.counted(self.kept)):
@@ -224,8 +226,11 @@ class Pairs:
 
 def _begun(fit: JointFit, u: Real, seen: Counted) -> JointFit:
     """The same fit, not yet refined, with the initial state of its input, (n,), unknown."""
-    missed = interpolation_error(u, fit.problem.source.oversampling)
-    source = prepared(u, fit.best.intersample, rest=False, precision=max(missed, WINDOW))
+    finer, precision = fit.problem.source.oversampling, PRECISION
+    if fit.best.intersample == "bandlimited":
+        missed = interpolation_error(u, finer)
+        precision = missed if finer > 1 else max(missed, WINDOW)
+    source = prepared(u, fit.best.intersample, rest=False, precision=precision)
     problem = replace(fit.problem, source=source, valid=seen.valid, begins=seen.first)
     return replace(fit, problem=problem, weighed=problem, forgotten=seen.first or 0)
 

@@ -121,8 +121,8 @@ def start(
     if intersample is None and looks_held(u):
         intersample = "zoh"  # only a held input stands still and jumps
     natural: Intersample = "bandlimited" if intersample is None else intersample
-    trends = nuisance if nuisance is None or not small else nuisance[:-small]
-    rough = rough_response(u, _level(y, trends, valid), longest_delay=longest_lag(u.size))
+    level = _level(y, nuisance, valid, small=small)
+    rough = rough_response(u, level, longest_delay=longest_lag(u.size))
     data = Data(u=u, y=y, sources={}, rough=rough, nuisance=nuisance, small=small)
     course = begun(data, natural, structures, Counted(valid=valid, begins=None))
     fits = [*course.fits, *_leading_integrators(course)]
@@ -165,7 +165,7 @@ def turn_ahead(course: Course) -> Course:
     lag = data.rough.ahead
     if lag is None or best.is_white:
         return course
-    level = _level(data.y, data.trends, seen.valid)
+    level = _level(data.y, data.nuisance, seen.valid, small=data.small)
     rough = rough_response(data.u, level, longest_delay=longest_lag(level.size), lag=lag)
     ahead = replace(data, rough=rough)
     counted = np.ones(level.size, dtype=bool) if seen.valid is None else seen.valid.copy()
@@ -399,9 +399,13 @@ def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
     return found
 
 
-def _level(y: Real, nuisance: Real | None, valid: Mask | None) -> Real:
-    """An output for spectra: without its regression on the nuisance rows, gaps filled."""
-    if nuisance is not None:
+def _level(y: Real, nuisance: Real | None, valid: Mask | None, *, small: int = 0) -> Real:
+    """An output for spectra: without its regression on the nuisance rows, gaps filled.
+
+    The last `small` rows explain little, and stay.
+    """
+    nuisance = nuisance if nuisance is None or not small else nuisance[:-small]
+    if nuisance is not None and len(nuisance):
         counts = slice(None) if valid is None else valid
         every = np.vstack([nuisance, np.ones(y.size)])[:, counts]
         y = y - solved(every @ every.T, every @ y[counts])[:-1] @ nuisance

@@ -86,12 +86,6 @@ class Data:
     precision: float = PRECISION
     small: int = 0  # last rows of `nuisance` that explain little
 
-    @property
-    def trends(self) -> Real | None:
-        """The rows that may explain much of the output."""
-        rows = self.nuisance
-        return rows if rows is None or not self.small else rows[: -self.small]
-
     def problem(self, mode: Intersample, seen: Counted) -> Problem:
         """The data under one assumption, with the samples that count."""
         rest = seen.begins is None

@@ -349,7 +349,8 @@ def fit_structure(
     The fit has converged if a step lowers the sum of squares by less than `precision`, in units of
     σ²; a parameter then is within about the root of it, in standard deviations. It is given up
     after so many iterations, or where a step promises to leave more than `hopeless`, and more than
-    a quarter of what it begins with.
+    a quarter of what it begins with. It is also given up if its latest steps hardly gain, or if at
+    its pace so far it would still end above `hopeless`.
     """
     limits = {"precision": precision, "hopeless": hopeless}
     return fit_together([problem], [structure], [theta], iterations=iterations, **limits)[0]

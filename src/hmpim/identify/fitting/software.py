@@ -15,12 +15,11 @@ import numpy as np
 import scipy
 
 from hmpim.identify.arrays import Mask, Real
-from hmpim.identify.chance import CLEARLY
 from hmpim.identify.fitting.beginning import begins_of
 from hmpim.identify.fitting.data import polished, refit
 from hmpim.identify.fitting.fit import Fit, Problem, delayed, fit_structure
 from hmpim.identify.fitting.least_squares import solved_exactly
-from hmpim.identify.fitting.trial import JointFit, trial_of
+from hmpim.identify.fitting.trial import JointFit, as_likely, trial_of
 from hmpim.identify.fitting.unrelated import LEAST_ANSWER, is_unexplainable
 from hmpim.identify.kept import kept
 from hmpim.identify.noise.whiteness import effective_share
@@ -257,18 +256,10 @@ def _followed(
     for i in sorted(range(len(fits)), key=lambda i: fits[i].cost):
         fit = fits[i]
         if fit.structure.order and fit.cost <= TWICE * least.cost:
-            fits[i] = polished(problem, fit, hopeless=_as_likely(fit.structure, fits, count))
+            own = fit.structure.parameters
+            hopeless = min(as_likely(one, own, count) for one in fits)
+            fits[i] = polished(problem, fit, hopeless=hopeless)
     return fits
-
-
-def _as_likely(structure: Structure, fits: list[Fit], count: float) -> float:
-    """Largest sum of squares with which a structure is about as likely as the likeliest fit."""
-    price = float(np.log(count)) / count
-    paid = (
-        fit.cost * float(np.exp(price * (fit.structure.parameters - structure.parameters)))
-        for fit in fits
-    )
-    return min(paid) * float(np.exp(2 * CLEARLY / count))
 
 
 def _walked(problem: Problem, structure: Structure, fits: list[Fit]) -> list[Fit]:

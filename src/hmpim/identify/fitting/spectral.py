@@ -79,8 +79,8 @@ def fitted_roughly(
     """Fit a structure without integrators from all starts, (k, 1 + order), at once.
 
     The rough response is best `condensed`. The delay stays if it is `held`. At most so many
-    `steps` are taken. A start is followed until it no longer gains, or misses sixteen times as
-    much as the best one.
+    `steps` are taken. A start is followed until it no longer gains, or its squared error is sixteen
+    times the best one's.
     """
     model = _Rough(rough, structure)
     errors, (normal, moment) = model.errors(thetas), model.normal()

@@ -93,9 +93,10 @@ def schwarz(cost: float, count: float, parameters: int) -> float:
 
 
 def as_likely(fit: Fit, parameters: int, count: float, *, behind: float = 2 * CLEARLY) -> float:
-    """Objective at which a fit with so many parameters trails another one by so much.
+    """Objective at which a fit with so many parameters is less likely than another one.
 
-    By Schwarz's criterion of `count` independent samples; by default the odds are 400 to 1.
+    By `behind` in Schwarz's criterion of `count` independent samples; by default the odds are 400
+    to 1.
     """
     fewer = fit.structure.parameters - parameters
     return fit.objective * float(np.exp((fewer * np.log(count) + behind) / count))

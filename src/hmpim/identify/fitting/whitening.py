@@ -55,8 +55,9 @@ def weighed_by_noise(problem: Problem, fit: Fit, data: Data) -> Data:
 def criterion_in_colour(
     data: Data, problem: Problem, fit: Fit, *, hopeless: float = np.inf
 ) -> float:
-    """Schwarz's criterion of a fit in noise of its own colour, given up if it promises `hopeless`.
+    """Schwarz's criterion of a fit in noise of its own colour.
 
+    The fit is given up once it cannot get below the criterion `hopeless`.
     One common colour would favour the fit from whose residual it is estimated.
     """
     noise = data.noise_left(problem, fit)

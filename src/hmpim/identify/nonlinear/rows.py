@@ -52,7 +52,7 @@ _Lag = Callable[[Fit], float]
 """Lag of the force behind the command, in samples, by a fit."""
 
 _SHRINKING = 2
-"""Steps of Newton's method for a dead zone, from which on each must be smaller than the last."""
+"""Steps of Newton's method for a dead zone after which each must be smaller than the one before."""
 
 _GUESSES = 2
 """Rows from which the size of friction is guessed, each from that of the former."""
