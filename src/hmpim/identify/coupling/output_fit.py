@@ -172,7 +172,8 @@ def fit_together(
         pairs.refine(pairs.kept, None)
     joined = len(pairs.strong)
     _join(inputs, pairs, plainly)
-    more = len(pairs.strong) > joined and whitening_of(pairs.residual()) is not None
+    white = whitening_of(pairs.residual()) is None
+    more = len(pairs.strong) > joined and not white
     if strong_only:
         pairs = _fitted_once_more(inputs, pairs, plainly) if more else pairs
         none = replace(pairs.fits[pairs.strong[0]], related=False)
@@ -180,7 +181,7 @@ def fit_together(
             fits=tuple(pairs.fits.get(j, none) for j in range(len(inputs))),
             strong=tuple(j in pairs.strong for j in range(len(inputs))),
         )
-    if fit_drift is not None and _may_drift(pairs):
+    if fit_drift is not None and not white and _may_drift(pairs):
 
         def steady(found: Led) -> OutputFit:
             same = Pairs(y=y, valid=valid, fits={}, strong=[], alike=alike)
@@ -201,8 +202,6 @@ def fit_together(
 
 def _may_drift(pairs: Pairs) -> bool:
     """Whether a drift, added to the strong inputs' fits, explains much of what they leave."""
-    if whitening_of(pairs.residual()) is None:
-        return False
     related = (pairs.fits[i] for i in pairs.strong if pairs.fits[i].related)
     if any(map(_is_slow, related)):  # this fit may explain it
         return True

@@ -382,20 +382,20 @@ def enrich(course: Course, fitted: Fits) -> tuple[Course, Fits]:
 def _with_tails(course: Course, fits: list[Fit]) -> list[Fit]:
     """Fits with one slow tail, two, and so on, while each is clearly likelier."""
     data, problem, found = course.data, course.problem, list[Fit]()
-    least: float | None = None
+    enough: float | None = None  # criterion from which on one more tail is not clearly likelier
     while data.keeps_samples:
         every = [*fits, *found]
         tailed = fit_with_tail(problem, every, course.others)
         if tailed is None:
             break
-        if least is None:
+        if enough is None:
             best = min(every, key=lambda fit: fit.objective)
-            least = criterion_in_colour(data, problem, best)
-        own = criterion_in_colour(data, problem, tailed, hopeless=least - 2 * CLEARLY)
-        if own >= least - 2 * CLEARLY:
+            enough = criterion_in_colour(data, problem, best) - 2 * CLEARLY
+        own = criterion_in_colour(data, problem, tailed, hopeless=enough)
+        if own >= enough:
             break
         found.append(tailed)
-        least = own
+        enough = own - 2 * CLEARLY
     return found
 
 

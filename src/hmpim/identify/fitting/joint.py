@@ -391,8 +391,10 @@ def _fed_forward(course: Course, trials: list[Trial], count: float) -> list[Tria
             continue
         known.add(structure)
         problem = course.data.problem("feedforward", course.counted)
-        limits = {"hopeless": as_likely(best, structure.parameters, count)}
-        fit = refit_between(problem, trial.fit, mode, "feedforward", iterations=40, **limits)
+        hopeless = as_likely(best, structure.parameters, count)
+        fit = refit_between(
+            problem, trial.fit, mode, "feedforward", iterations=40, hopeless=hopeless
+        )
         found.append(trial_of("feedforward", fit, count))
     return found
 

@@ -173,8 +173,8 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> NonlinearRow | 
     largest, structure = float(np.max(np.abs(fine))), start.structure
     tried = [_dead(fine, problem, start, gap * largest) for gap in GAPS]
     fit, half = start, _likeliest(tried, problem, start).size
-    changes: list[float] = []
-    for _ in range(TURNS):
+    last = np.inf
+    for turn in range(TURNS):
         lived = sampled(np.sign(fine) * np.maximum(np.abs(fine) - half, 0.0))
         source = prepare_input(lived, "bandlimited", rest=problem.begins is None)
         edges = sampled(np.sign(fine) * (np.abs(fine) > half))
@@ -187,9 +187,9 @@ def dead_zone(command: Command, problem: Problem, start: Fit) -> NonlinearRow | 
             return None
         if abs(change) < MATERIAL**2 * half:
             return _dead(fine, problem, fit, half)
-        changes.append(abs(change))
-        if len(changes) > _SHRINKING and changes[-1] >= changes[-2]:
+        if turn >= _SHRINKING and abs(change) >= last:
             break
+        last = abs(change)
     return None
 
 
